@@ -14,7 +14,7 @@ from radiosity_addon.lightmap.unwrap.chart_masks import chart_masks, mask_of
 from radiosity_addon.lightmap.unwrap.collapse import ChartPlaces, collapse
 from radiosity_addon.lightmap.unwrap.cut_empty import cut_empty_charts
 from radiosity_addon.lightmap.unwrap.occupancy import place
-from radiosity_addon.lightmap.unwrap.packing import Limits, pack
+from radiosity_addon.lightmap.unwrap.packing import SNAP, Limits, pack
 from radiosity_addon.numerics import signed_double_areas, triangle_areas
 
 from .lightmap_meshes import QUAD, area_uv, box, islands, quads
@@ -199,7 +199,10 @@ def test_the_halves_of_two_objects_are_not_joined() -> None:
 def test_what_is_folded_is_not_joined() -> None:
     triangles, _ = quads([[(0, 0, 0), (8, 0, 0), (8, 3, 0), (0, 3, 0.5)]])
     chart = np.array([0, 1])
-    assert join_coplanar(triangles[..., :2], triangles, chart, np.zeros(2, dtype=np.int64))[1].tolist() == [0, 1]
+    assert join_coplanar(triangles[..., :2], triangles, chart, np.zeros(2, dtype=np.int64))[1].tolist() == [
+        0,
+        1,
+    ]
 
 
 def test_no_texel_is_stretched_by_more_than_two() -> None:
@@ -213,7 +216,10 @@ def test_no_texel_is_stretched_by_more_than_two() -> None:
         flat = (placed.uv[:, 1:] - placed.uv[:, :1]).astype(float) * 256
         across = np.linalg.qr(edges.transpose(0, 2, 1))[1]
         scales = np.linalg.svd(flat.transpose(0, 2, 1) @ np.linalg.inv(across), compute_uv=False)
-        np.testing.assert_allclose(scales, atlas.pages[0].density, rtol=1e-3)
+        # Charts are shrunk to whole texels.
+        density = atlas.pages[0].density
+        assert (scales < (1 + 1e-3) * density).all()
+        assert (scales > (1 - SNAP - 1e-3) * density).all()
     assert len(np.unique(islands(atlas.objects[0].uv))) <= 6
 
 

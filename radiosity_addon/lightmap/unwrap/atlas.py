@@ -22,6 +22,7 @@ from .align import chart_extents
 from .atlas_input import AtlasInput, AtlasOptions
 from .collapse import chart_places
 from .cut_empty import cut_empty_charts
+from .distortion import Stretched, stretched_faces, stretched_warnings
 from .dominant_object import greedy_object, share_of
 from .kept_uvs import are_apart, has_area, is_collapsed, overlaps
 from .packing import Limits, Packing, pack, page_size
@@ -69,6 +70,7 @@ class Atlas:
     objects: tuple[AtlasObject, ...]
     pages: tuple[AtlasPage, ...]
     warnings: tuple[BakeWarning, ...] = ()
+    stretched: tuple[Stretched, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,26 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
         for each, uv in zip(group, np.split(packing.uv, ends[:-1]), strict=True):
             placed[each] = AtlasObject(uv, number)
     pages = tuple(_page(packing) for _, packing in laid)
-    return Atlas(tuple(each for each in placed if each is not None), pages, tuple(warnings))
+    all_placed = tuple(each for each in placed if each is not None)
+    stretched = _stretched(layouts, all_placed, pages)
+    return Atlas(all_placed, pages, (*warnings, *stretched_warnings(stretched)), tuple(stretched))
+
+
+def _stretched(
+    layouts: list[_Layout], placed: tuple[AtlasObject, ...], pages: tuple[AtlasPage, ...]
+) -> list[Stretched]:
+    """Return what is stretched of the objects that were laid out here."""
+    found: list[Stretched] = []
+    for layout, each in zip(layouts, placed, strict=True):
+        source = layout.source
+        if not layout.kept and len(source.triangles):
+            triangles = np.asarray(source.triangles, dtype=np.float64)
+            polygon = np.asarray(source.polygon, dtype=np.int64)
+            page = each.page, pages[each.page].resolution
+            found += stretched_faces(
+                source.name, triangles, numbered(polygon), layout.charts.uv, each.uv, page
+            )
+    return found
 
 
 def run_atlas(

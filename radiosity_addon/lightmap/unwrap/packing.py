@@ -220,7 +220,10 @@ def _measured(job: _Job, scale: Float, cell: int, side: int) -> tuple[Float, Cha
     if job.places is not None:
         taken = job.extent * cells
         whole = np.floor(taken)
-        cells = np.where((whole < taken) & (whole > (1.0 - SNAP) * taken), whole / np.maximum(taken, 1e-30), 1.0) * cells
+        cells = (
+            np.where((whole < taken) & (whole > (1.0 - SNAP) * taken), whole / np.maximum(taken, 1e-30), 1.0)
+            * cells
+        )
     return cells, chart_masks(job.uv * cells[job.chart][:, None], job.chart, job.extent * cells)
 
 
