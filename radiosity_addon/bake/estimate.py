@@ -28,8 +28,8 @@ TRIANGLES_A_CHART = 24.0
 """… triangles (the office)."""
 
 MOST_GAPS = 0.12
-"""Of `ChartTotals`: few charts are most of the surface, and the others need hardly any gaps. Fitted, as is what
-charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
+"""Of `ChartTotals`: few charts are most of the surface, and the others need hardly any gaps. Fitted, as is
+what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
 utilization and texels per meter are right within 10 % there."""
 
 RAYS_A_TEXEL = {"draft": 27.0, "medium": 48.0, "high": 140.0}
