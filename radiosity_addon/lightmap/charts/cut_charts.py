@@ -38,6 +38,9 @@ PIECE = 20_000
 BATCH = 8_000
 """Triangles of several objects that are cut together."""
 
+JOINED = 100_000
+"""Triangles of several objects whose charts are joined together: some 100 MB."""
+
 _FLAT = 1e-7
 """A triangle whose height is less than this share of its longest side has no area."""
 
@@ -110,7 +113,14 @@ def unwrap(
         uv[rows] = batch_uv
         chart[rows] = np.where(batch_chart >= 0, batch_chart + count, -1)
         count = max(count, int(batch_chart.max(initial=-1)) + 1 + count)
-    uv, chart = join_coplanar(uv, triangles, chart, owner)
+    counts, start = np.bincount(owner), 0
+    for part in run_chunks(counts, JOINED):
+        end = start + int(counts[part].sum())
+        rows = slice(start, end)
+        uv[rows], chart[rows] = join_coplanar(uv[rows], triangles[rows], chart[rows], owner[rows])
+        start = end
+    used = chart >= 0
+    chart[used] = numbered(np.column_stack((owner[used], chart[used])))
     return Charts(uv, chart, int(chart.max(initial=-1)) + 1)
 
 
