@@ -13,6 +13,7 @@ from radiosity_addon.lightmap.charts.overlap import overlapping_triangles
 from radiosity_addon.lightmap.images.dilate import dilate
 from radiosity_addon.lightmap.texels.rasterization import coverage_sum, rasterize
 from radiosity_addon.lightmap.unwrap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas, run_atlas
+from radiosity_addon.lightmap.unwrap.packing import FEW_CHARTS, SNAP
 
 from .lightmap_meshes import area_3d, area_uv, box, cornell, islands, lumpy_ngons, quads, uv_sphere
 
@@ -96,7 +97,13 @@ def test_every_chart_has_its_surfaces_area(unwrapped):
     uv, density = atlas.objects[0].uv, atlas.pages[0].density
     chart = islands(uv)
     flat = np.bincount(chart, area_uv(uv)) * 256**2
-    np.testing.assert_allclose(flat, np.bincount(chart, area_3d(triangles)) * density**2, rtol=1e-3)
+    ratio = flat / (np.bincount(chart, area_3d(triangles)) * density**2)
+    if len(ratio) <= FEW_CHARTS:
+        np.testing.assert_allclose(ratio, 1.0, rtol=1e-3)
+    else:
+        # Among many, charts are shrunk to whole texels.
+        assert ratio.max() < 1.0 + 1e-3
+        assert ratio.min() > (1.0 - SNAP) ** 2 - 1e-3
 
 
 def test_planar_polygons_keep_the_area_of_every_triangle():

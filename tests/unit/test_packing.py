@@ -228,3 +228,17 @@ def test_triangles_lie_in_each_others_boxes(count: int) -> None:
     """A right triangle fills half of every box around it: with boxes apart no more than half is covered."""
     triangles = np.repeat([[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]], count, axis=0)
     assert area_uv(pack(triangles, np.arange(count), 256, None).uv).sum() > 0.5
+
+
+def test_charts_are_shrunk_to_whole_texels_where_that_is_little() -> None:
+    """Sides of 10.3 texels become 10, sides of 10.6 stay: they would shrink by more than a twentieth."""
+    pytest.importorskip("xatlas")
+    sides = np.repeat([(1.03, 2.0), (1.06, 1.5)], 40, axis=0)
+    corners = np.zeros((len(sides), 4, 3))
+    corners[:, [1, 2], 0], corners[:, 2:, 1] = sides[:, :1], sides[:, 1:]
+    objects = [AtlasInput(f"board {k}", *quads(each[None])) for k, each in enumerate(corners)]
+    atlas = run_atlas(objects, texel_density=10.0)
+    size = atlas.pages[0].resolution
+    found = np.array([np.sort(np.ptp(placed.uv.reshape(-1, 2), axis=0)) for placed in atlas.objects]) * size
+    np.testing.assert_allclose(found[:40], [[10.0, 20.0]] * 40, atol=1e-3)
+    np.testing.assert_allclose(found[40:], [[10.6, 15.0]] * 40, atol=1e-3)
