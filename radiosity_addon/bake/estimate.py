@@ -27,6 +27,11 @@ CHARTS = 6.0
 TRIANGLES_A_CHART = 24.0
 """… triangles (the office)."""
 
+MOST_GAPS = 0.12
+"""Of `ChartTotals`: few charts are most of the surface, and the others need hardly any gaps. Fitted, as is
+what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
+utilization and texels per meter are right within 10 % there."""
+
 RAYS_A_TEXEL = {"draft": 27.0, "medium": 48.0, "high": 140.0}
 """Rays for each texel in a scene of one triangle; in others by the fourth root of their number."""
 
@@ -154,7 +159,7 @@ def _thinned(objects: Sequence[LightmappedObject], settings: BakeSettings) -> li
         return [1.0] * len(objects)
     return justified_scales(
         [
-            Extent(item.box, item.surface, item.scale == 1.0 and not item.keeps_uvs)
+            Extent(item.box, item.surface, item.scale == 1.0 and not item.keeps_uvs, item.triangles)
             for item in objects
             if item.box is not None
         ]
@@ -219,4 +224,4 @@ def _totals(objects: Sequence[LightmappedObject], padding: int) -> ChartTotals:
     """Take each object's charts for squares of the same size."""
     area = np.array([item.surface for item in objects], dtype=np.float64)
     count = np.array([item.charts for item in objects], dtype=np.float64)
-    return ChartTotals(area, 2.0 * np.sqrt(area * count), count, padding)
+    return ChartTotals(area, 2.0 * np.sqrt(area * count), count, padding, MOST_GAPS)

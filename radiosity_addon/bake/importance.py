@@ -3,7 +3,7 @@
 Texels are as dense everywhere, unless an object says otherwise. But a ground disc 200 m wide around a house
 would take nine tenths of the page, for places that nobody is near to. Where one object would take more than
 all others together, only the part of it that lies among them counts; unless it encloses them, as a room does,
-or they are too few to say where the scene is.
+or they are too few, and too simple, to say where the scene is.
 Neither a camera nor a lamp has a say: moving them changes no layout.
 """
 
@@ -26,13 +26,21 @@ ENCLOSED = 0.01
 """Parts of the diagonal by which the others may stick out of an object that encloses them."""
 
 OTHERS = 8
-"""So many other objects are a scene; a pebble on a floor is not."""
+"""So many other objects are a scene, …"""
+
+DETAIL = 200, 50.0
+"""… or fewer, a house in one piece, that have as many triangles, and many times those of the large object; a
+pebble on a floor is not."""
 
 LEAST_SCALE = 0.125
 """An object is never thinned out further, …"""
 
-LEAST_SHARE = 0.25
-"""… nor given less than this part of the page, if it would take more by its surface."""
+LEAST_SHARE, LEAST_SHARE_OF_FEW = 0.25, 0.5
+"""… nor given less than this part of the page, if it would take more by its surface: next to a scene, and
+next to fewer objects."""
+
+MOST_SHARE_OF_FEW = 0.8
+"""Next to fewer objects it is thinned out only if it would take more of the page."""
 
 MARKED = 0.5
 """An object is thinned out only if the part of it that counts is less than this."""
@@ -40,24 +48,29 @@ MARKED = 0.5
 
 @dataclass(frozen=True)
 class Extent:
-    """An object's box (2, 3) [m], its surface [m²], and whether its density may be chosen for it."""
+    """An object's box (2, 3) [m], its surface [m²], whether its density is free, its number of triangles."""
 
     box: Array
     surface: float
     free: bool
+    triangles: int = 0
 
 
 def justified_scales(extents: Sequence[Extent]) -> list[float]:
     """Return a factor for each object's texels per meter: 1, or less for what is thinned out."""
     scales = [1.0] * len(extents)
-    if len(extents) <= OTHERS:
+    if not extents:
         return scales
     boxes = np.array([extent.box for extent in extents])
     surface = np.array([extent.surface for extent in extents])
     largest = int(surface.argmax())
     others = (surface > 0) & (np.arange(len(extents)) != largest)
     rest = float(surface[others].sum())
-    if not extents[largest].free or others.sum() < OTHERS or rest >= surface[largest]:
+    share = rest / max(rest + float(surface[largest]), 1e-300)
+    few = int(others.sum()) < OTHERS
+    if not extents[largest].free or not others.any():
+        return scales
+    if share >= (1.0 - MOST_SHARE_OF_FEW if few else 0.5) or (few and not _detailed(extents, largest)):
         return scales
     low, high = boxes[others, 0].min(axis=0), boxes[others, 1].max(axis=0)
     diagonal = float(np.linalg.norm(high - low))
@@ -67,9 +80,16 @@ def justified_scales(extents: Sequence[Extent]) -> list[float]:
     margin = AMONG * diagonal
     part = _part_within(box, np.stack([low - margin, high + margin]))
     if part < MARKED:
-        least = LEAST_SHARE / (1.0 - LEAST_SHARE) * rest / surface[largest]
+        least_share = LEAST_SHARE_OF_FEW if few else LEAST_SHARE
+        least = least_share / (1.0 - least_share) * rest / surface[largest]
         scales[largest] = float(np.sqrt(min(max(part, least, LEAST_SCALE**2), 1.0)))
     return scales
+
+
+def _detailed(extents: Sequence[Extent], largest: int) -> bool:
+    """Return whether the others have far more triangles than the largest object."""
+    rest = sum(extent.triangles for extent in extents) - extents[largest].triangles
+    return rest >= max(DETAIL[0], DETAIL[1] * extents[largest].triangles)
 
 
 def _part_within(box: Array, other: Array) -> float:
@@ -96,6 +116,7 @@ def scales_of(bake_scene: BakeScene, baked: Sequence[BakeObject], settings: Bake
                 _box(bake_scene.scene.triangles[item.rows][item.lit]),
                 float(areas[item.rows][item.lit].sum()) * item.texel_scale**2,
                 item.uv is None and item.texel_scale == 1.0,
+                int(item.lit.sum()),
             )
             for item in baked
         ]

@@ -362,7 +362,7 @@ def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
         )
 
 
-def _page_facts(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
+def _page_facts(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, Any], ...]:
     """Return what the report says of each page."""
     return tuple(
         {
@@ -370,6 +370,16 @@ def _page_facts(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str
             "texels_per_metre": laid.density,
             "utilisation": float(page.coverage.mean()),
             "objects": sum(item.page == number for item in atlas.objects),
+            "stretched": _stretched(atlas, number),
         }
         for number, (laid, page) in enumerate(zip(atlas.pages, pages, strict=True))
     )
+
+
+def _stretched(atlas: Atlas, page: int) -> dict[str, int]:
+    """Return how many triangles of a page have stretched texels, by reason."""
+    counts: dict[str, int] = {}
+    for each in atlas.stretched:
+        if each.page == page:
+            counts[each.reason] = counts.get(each.reason, 0) + each.faces
+    return counts

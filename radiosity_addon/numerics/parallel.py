@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import TimeoutError as NotYet
 from functools import partial
 from typing import TypeVar
 
@@ -20,6 +21,9 @@ from .arrays import Array
 from .scratch import trim
 
 T = TypeVar("T")
+
+POLL = 0.1
+"""Seconds between looks for cancelation."""
 
 
 def thread_count(threads: int) -> int:
@@ -65,7 +69,12 @@ def _store(
 
 
 def map_chunks(
-    work: Callable[[slice], T], rows: int, chunk: int, threads: int, progress: Progress = SILENT
+    work: Callable[[slice], T],
+    rows: int,
+    chunk: int,
+    threads: int,
+    progress: Progress = SILENT,
+    abort: Callable[[], None] | None = None,
 ) -> Iterator[tuple[slice, T]]:
     """Call `work` on slices of at most `chunk` rows; return each slice with its result, in order.
 
@@ -73,6 +82,7 @@ def map_chunks(
 
     work: A kernel; takes a slice of rows.
     threads: 0 means all cores.
+    abort: Makes the slices in hand end soon. With it, cancelation is noticed while they are worked on.
     """
     slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
     workers = min(thread_count(threads), len(slices))
@@ -82,12 +92,31 @@ def map_chunks(
         trim()
         return result
 
-    pool = ThreadPoolExecutor(workers) if workers > 1 else None
-    try:
-        results = map(one, slices) if pool is None else pool.map(one, slices)
-        for number, (piece, result) in enumerate(zip(slices, results, strict=True)):
-            yield piece, result
+    if workers <= 1 and abort is None:
+        for number, piece in enumerate(slices):
+            yield piece, one(piece)
             progress.at((number + 1) / len(slices))
+        return
+    pool, ended = ThreadPoolExecutor(max(workers, 1)), False
+    try:
+        futures = [pool.submit(one, piece) for piece in slices]
+        for number, piece in enumerate(slices):
+            yield piece, _result(futures[number], progress, number / len(slices), abort is not None)
+            progress.at((number + 1) / len(slices))
+        ended = True
     finally:
-        if pool is not None:
-            pool.shutdown(cancel_futures=True)
+        if abort is not None and not ended:
+            abort()
+        pool.shutdown(cancel_futures=True)
+
+
+def _result(future: Future[T], progress: Progress, fraction: float, polls: bool) -> T:
+    """Wait for a result; `polls` asks now and then whether the work was canceled."""
+    while polls:
+        try:
+            return future.result(POLL)
+        except NotYet:
+            if future.done():
+                break
+            progress.at(fraction)
+    return future.result()

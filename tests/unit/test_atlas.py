@@ -1,6 +1,5 @@
 """Atlases: polygons stay whole, charts stay apart and to scale, pages hold what was asked."""
 
-
 import numpy as np
 import pytest
 
@@ -14,6 +13,7 @@ from radiosity_addon.lightmap.charts.overlap import overlapping_triangles
 from radiosity_addon.lightmap.images.dilate import dilate
 from radiosity_addon.lightmap.texels.rasterization import coverage_sum, rasterize
 from radiosity_addon.lightmap.unwrap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas, run_atlas
+from radiosity_addon.lightmap.unwrap.packing import FEW_CHARTS, SNAP
 
 from .lightmap_meshes import area_3d, area_uv, box, cornell, islands, lumpy_ngons, quads, uv_sphere
 
@@ -97,7 +97,13 @@ def test_every_chart_has_its_surfaces_area(unwrapped):
     uv, density = atlas.objects[0].uv, atlas.pages[0].density
     chart = islands(uv)
     flat = np.bincount(chart, area_uv(uv)) * 256**2
-    np.testing.assert_allclose(flat, np.bincount(chart, area_3d(triangles)) * density**2, rtol=1e-3)
+    ratio = flat / (np.bincount(chart, area_3d(triangles)) * density**2)
+    if len(ratio) <= FEW_CHARTS:
+        np.testing.assert_allclose(ratio, 1.0, rtol=1e-3)
+    else:
+        # Among many, charts are shrunk to whole texels.
+        assert ratio.max() < 1.0 + 1e-3
+        assert ratio.min() > (1.0 - SNAP) ** 2 - 1e-3
 
 
 def test_planar_polygons_keep_the_area_of_every_triangle():
@@ -279,8 +285,8 @@ def test_without_a_chart_grower_every_polygon_is_a_chart():
 def test_a_polygon_that_the_grower_cuts_gets_its_own_chart():
     triangles, polygon = box((1, 1, 1))
 
-    def cutting(vertices, faces):
-        uv, chart = grow_charts(vertices, faces)
+    def cutting(vertices, faces, mesh):
+        uv, chart = grow_charts(vertices, faces, mesh)
         chart[0] = chart.max() + 1
         return uv, chart
 
@@ -379,7 +385,7 @@ def test_overlaps_within_a_chart_are_found_and_cut_out():
     outer = np.stack((2 * np.cos(angle), 2 * np.sin(angle), 0.02 * angle), axis=-1)
     triangles, polygon = quads(np.stack((inner[:-1], outer[:-1], outer[1:], inner[1:]), axis=1))
 
-    def from_above(vertices, faces):
+    def from_above(vertices, faces, _):
         return vertices[faces][..., :2], np.zeros(len(faces), dtype=np.int64)
 
     wound = triangles[..., :2]

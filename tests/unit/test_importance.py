@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake import LightmappedObject, estimate_bake, thinned_out
-from radiosity_addon.bake.importance import LEAST_SCALE, LEAST_SHARE, Extent, justified_scales
+from radiosity_addon.bake.importance import (
+    LEAST_SCALE,
+    LEAST_SHARE,
+    LEAST_SHARE_OF_FEW,
+    Extent,
+    justified_scales,
+)
 from radiosity_addon.options import BakeSettings
 
 
@@ -47,6 +53,34 @@ def test_a_room_encloses_what_is_in_it() -> None:
 def test_a_pebble_on_a_floor_is_no_scene() -> None:
     floor = extent((-1, -1, 0), (1, 1, 0), 4.0)
     assert justified_scales([extent((0, 0, 0.5), (0.02, 0.02, 0.5), 4e-4), floor]) == [1.0, 1.0]
+
+
+JOINED = Extent(np.array([[-4.0, -6, 0], [4, 6, 6]]), 600.0, True, triangles=5_000)
+PLANE = Extent(np.array([[-100.0, -100, 0], [100, 100, 0]]), 40_000.0, True, triangles=2)
+
+
+def test_a_ground_around_a_house_in_one_piece_leaves_it_half_of_the_page() -> None:
+    house, ground = justified_scales([JOINED, PLANE])
+    assert house == 1.0
+    taken = ground**2 * PLANE.surface
+    assert taken / (taken + JOINED.surface) == pytest.approx(
+        max(LEAST_SHARE_OF_FEW, LEAST_SCALE**2 / (LEAST_SCALE**2 + JOINED.surface / PLANE.surface))
+    )
+
+
+@pytest.mark.parametrize(
+    ("house", "ground"),
+    [
+        (replace(JOINED, triangles=12), PLANE),
+        (JOINED, replace(PLANE, triangles=101)),
+        (replace(JOINED, surface=10_000.0), PLANE),
+        (JOINED, replace(PLANE, free=False)),
+        (JOINED, replace(PLANE, box=PLANE.box + np.array([[0, 0, -1], [0, 0, 50]]))),
+    ],
+    ids=["no detail", "a landscape", "not nearly all", "chosen", "encloses it"],
+)
+def test_next_to_one_object_a_ground_stays(house: Extent, ground: Extent) -> None:
+    assert justified_scales([house, ground]) == [1.0, 1.0]
 
 
 def test_what_is_chosen_or_alone_or_not_the_most_stays() -> None:

@@ -14,7 +14,7 @@ from radiosity_addon.lightmap.unwrap.chart_masks import chart_masks, mask_of
 from radiosity_addon.lightmap.unwrap.collapse import ChartPlaces, collapse
 from radiosity_addon.lightmap.unwrap.cut_empty import cut_empty_charts
 from radiosity_addon.lightmap.unwrap.occupancy import place
-from radiosity_addon.lightmap.unwrap.packing import Limits, pack
+from radiosity_addon.lightmap.unwrap.packing import SNAP, Limits, pack
 from radiosity_addon.numerics import signed_double_areas, triangle_areas
 
 from .lightmap_meshes import QUAD, area_uv, box, islands, quads
@@ -183,17 +183,26 @@ def test_a_frame_becomes_four_bars_where_that_saves_texels() -> None:
 def test_the_halves_of_a_quad_are_joined() -> None:
     triangles, _ = quads([[(0, 0, 1), (8, 0, 1), (8, 3, 1), (0, 3, 1)]])
     apart = triangles[..., :2] + np.array([0.0, 10.0])[:, None, None]
-    uv, chart = join_coplanar(apart, triangles, np.array([0, 1]))
+    uv, chart = join_coplanar(apart, triangles, np.array([0, 1]), np.zeros(2, dtype=np.int64))
     assert chart.tolist() == [0, 0]
     np.testing.assert_allclose(area_uv(uv), 12.0)
     extent = np.ptp(align(uv, chart, 1).reshape(-1, 2), axis=0)
     np.testing.assert_allclose(np.sort(extent), (3, 8), atol=1e-9)
 
 
+def test_the_halves_of_two_objects_are_not_joined() -> None:
+    triangles, _ = quads([[(0, 0, 1), (8, 0, 1), (8, 3, 1), (0, 3, 1)]])
+    _, chart = join_coplanar(triangles[..., :2], triangles, np.array([0, 1]), np.array([0, 1]))
+    np.testing.assert_array_equal(chart, [0, 1])
+
+
 def test_what_is_folded_is_not_joined() -> None:
     triangles, _ = quads([[(0, 0, 0), (8, 0, 0), (8, 3, 0), (0, 3, 0.5)]])
     chart = np.array([0, 1])
-    assert join_coplanar(triangles[..., :2], triangles, chart)[1].tolist() == [0, 1]
+    assert join_coplanar(triangles[..., :2], triangles, chart, np.zeros(2, dtype=np.int64))[1].tolist() == [
+        0,
+        1,
+    ]
 
 
 def test_no_texel_is_stretched_by_more_than_two() -> None:
@@ -207,7 +216,10 @@ def test_no_texel_is_stretched_by_more_than_two() -> None:
         flat = (placed.uv[:, 1:] - placed.uv[:, :1]).astype(float) * 256
         across = np.linalg.qr(edges.transpose(0, 2, 1))[1]
         scales = np.linalg.svd(flat.transpose(0, 2, 1) @ np.linalg.inv(across), compute_uv=False)
-        np.testing.assert_allclose(scales, atlas.pages[0].density, rtol=1e-3)
+        # Charts are shrunk to whole texels.
+        density = atlas.pages[0].density
+        assert (scales < (1 + 1e-3) * density).all()
+        assert (scales > (1 - SNAP - 1e-3) * density).all()
     assert len(np.unique(islands(atlas.objects[0].uv))) <= 6
 
 
@@ -216,3 +228,17 @@ def test_triangles_lie_in_each_others_boxes(count: int) -> None:
     """A right triangle fills half of every box around it: with boxes apart no more than half is covered."""
     triangles = np.repeat([[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]], count, axis=0)
     assert area_uv(pack(triangles, np.arange(count), 256, None).uv).sum() > 0.5
+
+
+def test_charts_are_shrunk_to_whole_texels_where_that_is_little() -> None:
+    """Sides of 10.3 texels become 10, sides of 10.6 stay: they would shrink by more than a twentieth."""
+    pytest.importorskip("xatlas")
+    sides = np.repeat([(1.03, 2.0), (1.06, 1.5)], 40, axis=0)
+    corners = np.zeros((len(sides), 4, 3))
+    corners[:, [1, 2], 0], corners[:, 2:, 1] = sides[:, :1], sides[:, 1:]
+    objects = [AtlasInput(f"board {k}", *quads(each[None])) for k, each in enumerate(corners)]
+    atlas = run_atlas(objects, texel_density=10.0)
+    size = atlas.pages[0].resolution
+    found = np.array([np.sort(np.ptp(placed.uv.reshape(-1, 2), axis=0)) for placed in atlas.objects]) * size
+    np.testing.assert_allclose(found[:40], [[10.0, 20.0]] * 40, atol=1e-3)
+    np.testing.assert_allclose(found[40:], [[10.6, 15.0]] * 40, atol=1e-3)

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.charts import growers, xatlas_worker
-from radiosity_addon.lightmap.charts.cut_charts import unwrap
+from radiosity_addon.base import Cancelled, Progress, Status
+from radiosity_addon.lightmap.charts import cut_charts, growers, xatlas_worker
+from radiosity_addon.lightmap.charts.cut_charts import Charts, unwrap
+from radiosity_addon.lightmap.charts.xatlas_worker import XatlasProcess
+from radiosity_addon.numerics import numbered
+from tests.unit.lightmap_meshes import uv_sphere
+
+Mesh = tuple[np.ndarray, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def bowl() -> tuple[np.ndarray, np.ndarray]:
+def bowl() -> Mesh:
     """A wavy sheet of 2,048 triangles, each about 1 in area."""
     side = 33
     x, y = np.meshgrid(np.arange(side, dtype=float), np.arange(side, dtype=float), indexing="ij")
@@ -22,44 +30,111 @@ def bowl() -> tuple[np.ndarray, np.ndarray]:
     return vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def test_the_other_process_gives_the_same_charts(bowl) -> None:
-    found = xatlas_worker.run_apart(*bowl)
-    assert found is not None
-    atlas, uv, chart = xatlas_worker.run_xatlas(*bowl)
-    growers.resting.keep(atlas)
-    np.testing.assert_array_equal(found[0], uv)
-    np.testing.assert_array_equal(found[1], chart)
+@pytest.fixture
+def process() -> Iterator[XatlasProcess]:
+    process = XatlasProcess()
+    yield process
+    process.close()
 
 
-def test_only_long_work_that_runs_apart_starts_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-
-    def apart(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        asked.append(len(faces))
-        return np.zeros((len(faces), 3, 2)), np.zeros(len(faces), dtype=np.int64)
-
-    monkeypatch.setattr(growers, "run_apart", apart)
+def two_of(bowl: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vertices, faces and numbers of two meshes, the second one mirrored."""
     vertices, faces = bowl
-    growers.grow_charts(vertices, faces[:20])
-    growers.grow_charts(vertices, faces)
-    assert asked == []
-    growers.grow_charts(vertices, faces[:20], apart=True)
-    growers.grow_charts(vertices, faces, apart=True)
-    assert asked == [len(faces)]
+    both = np.concatenate([vertices, vertices * (1, 1, -1)])
+    return both, np.concatenate([faces, faces + len(vertices)]), np.repeat([0, 5], len(faces))
+
+
+def test_another_process_gives_the_same_charts_time_after_time(bowl: Mesh, process: XatlasProcess) -> None:
+    meshes = two_of(bowl)
+    atlas, uv, chart = xatlas_worker.run_xatlas(*meshes)
+    growers.resting.keep(atlas)
+    for _ in range(2):
+        found = process.run(*meshes)
+        assert found is not None
+        np.testing.assert_array_equal(found[0], uv)
+        np.testing.assert_array_equal(found[1], chart)
+
+
+def test_meshes_cut_together_have_the_charts_that_they_have_alone(bowl: Mesh) -> None:
+    vertices, faces, mesh = two_of(bowl)
+    _, chart = growers.grow_charts(vertices, faces, mesh)
+    assert not set(chart[mesh == 0]) & set(chart[mesh == 5])
+    for number in (0, 5):
+        of = mesh == number
+        alone = growers.grow_charts(vertices, faces[of], mesh[of])[1]
+        np.testing.assert_array_equal(numbered(chart[of]), numbered(alone))
+
+
+@pytest.mark.parametrize(
+    ("triangles", "in_window", "processes"),
+    [(2000, True, 0), (2001, True, 3), (20_000, False, 0), (20_001, False, 3)],
+)
+def test_only_long_work_starts_processes(
+    bowl: Mesh, triangles: int, in_window: bool, processes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[XatlasProcess] = []
+    monkeypatch.setattr(growers, "XatlasProcess", lambda: made.append(XatlasProcess()) or made[-1])
+    with growers.PatientGrower(60.0, triangles, threads=3, in_window=in_window):
+        assert len(made) == processes
 
 
 @pytest.mark.parametrize("program", ["/nowhere/python", "/bin/false", "/bin/true"])
 def test_without_another_process_the_work_is_done_here(
-    bowl, program: str, monkeypatch: pytest.MonkeyPatch
+    bowl: Mesh, program: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", program)
-    assert xatlas_worker.run_apart(*bowl) is None
-    _, chart = growers.grow_charts(*bowl, apart=True)
-    assert len(chart) == len(bowl[1])
+    meshes = two_of(bowl)
+    with growers.PatientGrower(60.0, 10**6, threads=1) as grower:
+        uv, chart = grower(*meshes)
+    expected = growers.grow_charts(*meshes)
+    np.testing.assert_array_equal(uv, expected[0])
+    np.testing.assert_array_equal(chart, expected[1])
+
+
+def test_canceled_while_a_process_works_nothing_is_left_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process never answers; the work ends nevertheless, and the process with it."""
+    started: list[subprocess.Popen[bytes]] = []
+
+    def deaf() -> subprocess.Popen[bytes]:
+        program = [sys.executable, "-c", "import time; time.sleep(600)"]
+        started.append(subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
+        return started[-1]
+
+    def cancel(_: Status) -> None:
+        if started:
+            raise Cancelled
+
+    monkeypatch.setattr(xatlas_worker, "_started", deaf)
+    triangles, polygon = uv_sphere(6, 8)
+    with growers.PatientGrower(60.0, 10**6, threads=2) as grower, pytest.raises(Cancelled):
+        unwrap(triangles, polygon, grower, Progress(cancel), threads=2, abort=grower.close)
+    assert [process.poll() is not None for process in started] == [True]
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_charts_are_the_same_bytes_with_any_number_of_processes(
+    threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(growers, "WORTH_PROCESSES", 0)
+    monkeypatch.setattr(cut_charts, "BATCH", 200)
+    parts = [uv_sphere(6, 8 + k) for k in range(8)]
+    triangles = np.concatenate([part[0] for part in parts])
+    polygon = np.concatenate([part[1] for part in parts])
+    owner = np.repeat(np.arange(8), [len(part[0]) for part in parts])
+
+    def charts(count: int) -> Charts:
+        with growers.PatientGrower(60.0, len(triangles), count) as grower:
+            return unwrap(triangles, polygon, grower, threads=count, owner=owner)
+
+    one, several = charts(1), charts(threads)
+    np.testing.assert_array_equal(one.uv, several.uv)
+    np.testing.assert_array_equal(one.chart, several.chart)
+    here = unwrap(triangles, polygon, growers.grow_charts, owner=owner)
+    np.testing.assert_array_equal(one.uv, here.uv)
 
 
 @pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-6])
-def test_a_frame_of_thin_strips_becomes_charts(width: float) -> None:
+def test_a_frame_of_thin_strips_becomes_charts(width: float, process: XatlasProcess) -> None:
     """Unlimited, the bitmap in which xatlas packs it takes more bits than it can count."""
     outer = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     inner = outer * (1 - 2 * width) + width
@@ -69,7 +144,7 @@ def test_a_frame_of_thin_strips_becomes_charts(width: float) -> None:
     triangles = corners[np.concatenate(halves)]
     # Where it is unlimited this ends the process, so another one tries first.
     vertices = (corners - 0.5) / np.sqrt(0.5 * width)
-    assert xatlas_worker.run_apart(vertices, np.concatenate(halves)) is not None
+    assert process.run(vertices, np.concatenate(halves), np.zeros(8, dtype=np.int64)) is not None
     charts = unwrap(triangles, np.tile(side, 2), growers.grow_charts)
     assert (charts.chart >= 0).all()
     edges = charts.uv[:, 1:] - charts.uv[:, :1]

@@ -84,7 +84,8 @@ class BakeResult:
     warnings: The scene's and the bake's own.
     seconds: Wall-clock time of each stage.
     atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilisation"
-        (the share of texels that show a surface) and the number of "objects".
+        (the share of texels that show a surface), the number of "objects", and in "stretched" that of
+        triangles whose texels are more than twice as long as wide, by reason.
     groups: Those that were requested, and one of all light that is in none of them.
     light: Parallel to `objects`: statistics of the light on their fronts, see `details.py`.
     coincident: By the names of objects that have some: triangles that are in the place of other faces.
@@ -95,7 +96,7 @@ class BakeResult:
     solver: dict[str, Any]
     warnings: tuple[BakeWarning, ...]
     seconds: dict[str, float] = field(default_factory=dict)
-    atlas: tuple[dict[str, float], ...] = ()
+    atlas: tuple[dict[str, Any], ...] = ()
     groups: tuple[LightGroup, ...] = ()
     light: tuple[dict[str, Any], ...] = ()
     coincident: dict[str, int] = field(default_factory=dict)

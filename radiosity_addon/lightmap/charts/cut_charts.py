@@ -1,4 +1,4 @@
-"""Cutting one object into charts that lie flat, to scale and front side up.
+"""Cutting objects into charts that lie flat, to scale and front side up.
 
 A polygon must stay whole in one chart, because UVs are written per polygon corner; the chart
 grower works on triangles and now and then cuts one. Such polygons get a chart of their own.
@@ -6,7 +6,7 @@ grower works on triangles and now and then cuts one. Such polygons get a chart o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import SILENT, Progress
-from ...numerics import connected_faces, double_area_vectors, map_chunks, numbered, signed_double_areas
+from ...numerics import (
+    connected_faces,
+    double_area_vectors,
+    map_chunks,
+    numbered,
+    run_chunks,
+    signed_double_areas,
+)
 from .flatten import project, project_polygons, rescale_to_area, undo_stretch
 from .join_coplanar import join_coplanar
 from .overlap import overlapping_triangles
@@ -22,11 +29,17 @@ from .overlap import overlapping_triangles
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-GrowCharts = Callable[[Float, Int], tuple[Float, Int]]
-"""(vertices (v, 3), faces (n, 3)) → (uv (n, 3, 2), chart (n,), −1 where a face was left out)."""
+GrowCharts = Callable[[Float, Int, Int], tuple[Float, Int]]
+"""(vertices (v, 3), faces (n, 3), object (n,)) → (uv (n, 3, 2), chart (n,), −1 where a face was left out)."""
 
 PIECE = 20_000
-"""Triangles handed to the chart grower at once: it can neither report progress nor stop."""
+"""Triangles of one object handed to the chart grower at once: it can neither report progress nor stop."""
+
+BATCH = 8_000
+"""Triangles of several objects that are cut together."""
+
+JOINED = 100_000
+"""Triangles of several objects whose charts are joined together: some 100 MB."""
 
 _FLAT = 1e-7
 """A triangle whose height is less than this share of its longest side has no area."""
@@ -37,7 +50,7 @@ _COPLANAR = 1e-5
 
 @dataclass(frozen=True)
 class Charts:
-    """One object's charts.
+    """The charts of one object, or of several.
 
     uv (n, 3, 2): 1 unit is 1 m; every chart has its own origin.
     chart (n,) int64: 0 … count − 1, or −1 for triangles of polygons without area.
@@ -48,41 +61,92 @@ class Charts:
     count: int
 
 
+def join_charts(parts: Sequence[Charts]) -> Charts:
+    """Return the charts of several objects, one after the other."""
+    count = np.cumsum([0, *(part.count for part in parts)])
+    chart = [
+        np.where(part.chart >= 0, part.chart + before, -1)
+        for part, before in zip(parts, count[:-1], strict=True)
+    ]
+    return Charts(np.concatenate([part.uv for part in parts]), np.concatenate(chart), int(count[-1]))
+
+
+def split_charts(charts: Charts, counts: Sequence[int]) -> list[Charts]:
+    """Return the charts of each of several objects that have so many triangles."""
+    parts, start = [], 0
+    for end in np.cumsum(counts).tolist():
+        chart = charts.chart[start:end].copy()
+        used = chart >= 0
+        chart[used] = numbered(chart[used])
+        parts.append(Charts(charts.uv[start:end], chart, int(chart.max(initial=-1)) + 1))
+        start = end
+    return parts
+
+
 def unwrap(
     triangles: Float,
     polygon: Int,
     grow: GrowCharts | None,
     progress: Progress = SILENT,
     threads: int = 1,
+    owner: Int | None = None,
+    abort: Callable[[], None] | None = None,
 ) -> Charts:
-    """Cut an object into charts, piece by piece.
+    """Cut objects into charts, batch by batch: many small objects, or a piece of a large one.
 
     triangles (n, 3, 3): Corners in world space [m].
-    polygon (n,) int: The polygon of each triangle.
+    polygon (n,) int: The polygon of each triangle, in its object.
     grow: The chart grower; None gives every polygon a chart of its own.
-    threads: Pieces that are cut at once; 0 means all cores.
+    threads: Batches that are cut at once; 0 means all cores.
+    owner (n,) int64: The object of each triangle, ascending; None for one object. No chart has several.
+    abort: Makes the grower end soon, when canceled.
     """
-    polygon = numbered(polygon)
+    owner = np.zeros(len(triangles), dtype=np.int64) if owner is None else numbered(owner)
+    polygon = numbered(np.column_stack((owner, polygon)))
     uv = np.zeros((len(triangles), 3, 2))
     chart = np.full(len(triangles), -1, dtype=np.int64)
+    batches = list(_batches(triangles, polygon, owner))
+    cut = partial(_unwrap_one, triangles, polygon, owner, grow, batches)
     count = 0
-    pieces = list(_pieces(triangles, polygon))
-    cut = partial(_unwrap_one, triangles, polygon, grow, pieces)
-    for part, (piece_uv, piece_chart) in map_chunks(cut, len(pieces), 1, threads, progress):
-        rows = pieces[part.start]
-        uv[rows] = piece_uv
-        chart[rows] = np.where(piece_chart >= 0, piece_chart + count, -1)
-        count = max(count, int(chart.max()) + 1)
-    if count > 1:
-        uv, chart = join_coplanar(uv, triangles, chart)
+    for part, (batch_uv, batch_chart) in map_chunks(cut, len(batches), 1, threads, progress, abort):
+        rows = batches[part.start]
+        uv[rows] = batch_uv
+        chart[rows] = np.where(batch_chart >= 0, batch_chart + count, -1)
+        count = max(count, int(batch_chart.max(initial=-1)) + 1 + count)
+    counts, start = np.bincount(owner), 0
+    for part in run_chunks(counts, JOINED):
+        end = start + int(counts[part].sum())
+        rows = slice(start, end)
+        uv[rows], chart[rows] = join_coplanar(uv[rows], triangles[rows], chart[rows], owner[rows])
+        start = end
+    used = chart >= 0
+    chart[used] = numbered(np.column_stack((owner[used], chart[used])))
     return Charts(uv, chart, int(chart.max(initial=-1)) + 1)
 
 
 def _unwrap_one(
-    triangles: Float, polygon: Int, grow: GrowCharts | None, pieces: list[NDArray[np.intp]], part: slice
+    triangles: Float,
+    polygon: Int,
+    owner: Int,
+    grow: GrowCharts | None,
+    batches: list[NDArray[np.intp]],
+    part: slice,
 ) -> tuple[Float, Int]:
-    rows = pieces[part.start]
-    return _unwrap_piece(triangles[rows], polygon[rows], grow)
+    rows = batches[part.start]
+    return _unwrap_batch(triangles[rows], polygon[rows], owner[rows], grow)
+
+
+def _batches(triangles: Float, polygon: Int, owner: Int) -> Iterator[NDArray[np.intp]]:
+    """Yield the rows of each batch: whole objects while they have few triangles, else a piece of one."""
+    count = np.bincount(owner) if len(owner) else np.zeros(0, dtype=np.int64)
+    start = np.concatenate(([0], np.cumsum(count)))
+    for part in run_chunks(count, BATCH):
+        rows = np.arange(start[part.start], start[part.stop])
+        if len(rows) <= PIECE:
+            yield rows
+            continue
+        for piece in _pieces(triangles[rows], numbered(polygon[rows])):
+            yield rows[piece]
 
 
 def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:
@@ -102,23 +166,26 @@ def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:
         waiting += [part[len(part) // 2 :], part[: len(part) // 2]]
 
 
-def _unwrap_piece(
-    triangles: Float, polygon: Int, grow: GrowCharts | None, again: int = 2
+def _unwrap_batch(
+    triangles: Float, polygon: Int, owner: Int, grow: GrowCharts | None, again: int = 2
 ) -> tuple[Float, Int]:
-    """Return uv (n, 3, 2) [m] and chart (n,) of one piece; charts are numbered without gaps.
+    """Return uv (n, 3, 2) [m] and chart (n,) of a batch; charts are numbered without gaps.
 
     What overlaps within its chart is cut out and unwrapped by itself, `again` times by the
     grower, at last polygon by polygon.
     """
     count = len(triangles)
     polygon = numbered(polygon)
-    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    corners = triangles.reshape(-1, 3)
+    index = numbered(np.column_stack((np.repeat(owner, 3), corners)))
     faces = index.reshape(count, 3)
     solid = _has_area(triangles)
     uv = np.zeros((count, 3, 2))
     chart = np.full(count, -1, dtype=np.int64)
     if grow is not None and solid.any():
-        uv[solid], chart[solid] = grow(_normalized(corners, triangles[solid]), faces[solid])
+        vertices = np.empty((int(index.max()) + 1, 3))
+        vertices[index] = _normalized(triangles, owner, solid).reshape(-1, 3)
+        uv[solid], chart[solid] = grow(vertices, faces[solid], owner[solid])
     torn = _torn_polygons(uv, chart, faces, polygon, solid)
     own = torn[polygon]
     if own.any():
@@ -135,7 +202,7 @@ def _unwrap_piece(
     over = _overlapping_polygons(uv, np.where(own, -1, chart), polygon)
     if not len(over):
         return uv, chart
-    redone = _unwrap_piece(triangles[over], polygon[over], grow if again else None, again - 1)
+    redone = _unwrap_batch(triangles[over], polygon[over], owner[over], grow if again else None, again - 1)
     chart[over] = -1
     chart = _split_parts(uv, chart)
     uv[over], chart[over] = redone[0], redone[1] + chart.max() + 1
@@ -176,11 +243,18 @@ def _has_area(triangles: Float) -> NDArray[np.bool_]:
     return np.asarray((longest > 0) & (np.linalg.norm(cross, axis=1) > _FLAT * longest**2))
 
 
-def _normalized(corners: Float, triangles: Float) -> Float:
-    """Move to the origin and scale to a mean triangle of area 1: the grower's epsilons are absolute."""
-    cross = double_area_vectors(triangles)
-    size = np.sqrt(0.5 * np.linalg.norm(cross, axis=1).mean())
-    return np.asarray((corners - 0.5 * (corners.min(axis=0) + corners.max(axis=0))) / size)
+def _normalized(triangles: Float, owner: Int, solid: NDArray[np.bool_]) -> Float:
+    """Move objects to the origin and scale them to a mean triangle of area 1: epsilons are absolute."""
+    number = numbered(owner)
+    count = int(number.max()) + 1
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, number, triangles.min(axis=1))
+    np.maximum.at(high, number, triangles.max(axis=1))
+    area = np.linalg.norm(double_area_vectors(triangles[solid]), axis=1)
+    having = np.maximum(np.bincount(number[solid], minlength=count), 1)
+    size = np.sqrt(0.5 * np.bincount(number[solid], area, count) / having)
+    middle, size = 0.5 * (low + high), np.where(size > 0, size, 1.0)
+    return np.asarray((triangles - middle[number][:, None]) / size[number][:, None, None])
 
 
 def _torn_polygons(

@@ -1,37 +1,40 @@
-"""Cutting meshes into charts: xatlas, and its fallback."""
+"""Cutting meshes into charts: xatlas, here or in other processes, and its fallback."""
 
 from __future__ import annotations
 
+import queue
+import threading
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base import Cancelled
+from ...numerics import thread_count
 from .box_charts import box_charts
 from .delayed_release import DelayedRelease
-from .xatlas_worker import WORTH_A_PROCESS, run_apart, run_xatlas
+from .xatlas_worker import XatlasProcess, run_xatlas
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+
+WORTH_A_PROCESS, WORTH_PROCESSES = 2_000, 20_000
+"""More triangles are cut in other processes, while a window is drawn and otherwise: starting takes time."""
 
 resting = DelayedRelease()
 """The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
-def grow_charts(vertices: Float, faces: Int, apart: bool = False) -> tuple[Float, Int]:
-    """Cut a mesh into charts with xatlas.
+def grow_charts(vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
+    """Cut meshes into charts with xatlas.
 
     vertices (v, 3): At a scale where triangles are about 1 in area, welded.
-    faces (n, 3) int64.
-    apart: Whether long work is done in another process, as a window is drawn or other threads work meanwhile.
+    faces (n, 3) int64: Those of one mesh use a range of vertices of their own.
+    mesh (n,) int64: Ascending.
     Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
     Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
-    if apart and len(faces) > WORTH_A_PROCESS:
-        grown = run_apart(vertices, faces)
-        if grown is not None:
-            return grown
-    atlas, uv, chart = run_xatlas(vertices, faces)
+    atlas, uv, chart = run_xatlas(vertices, faces, mesh)
     resting.keep(atlas)
     return uv, chart
 
@@ -39,19 +42,71 @@ def grow_charts(vertices: Float, faces: Int, apart: bool = False) -> tuple[Float
 class PatientGrower:
     """Grows charts with xatlas until an object has taken too long, and then by directions.
 
-    gave_up: Whether it came to that.
+    May be called from as many threads at once as it has processes. Leaving its context ends these.
+
+    gave_up: The objects that took too long.
     """
 
-    def __init__(self, seconds: float, apart: bool = False) -> None:
-        self._seconds, self._spent, self._apart = seconds, 0.0, apart
-        self.gave_up = False
+    def __init__(self, seconds: float, triangles: int = 0, threads: int = 1, in_window: bool = False) -> None:
+        """Start no process before it is needed, and none for few triangles."""
+        worth = triangles > (WORTH_A_PROCESS if in_window else WORTH_PROCESSES)
+        processes = thread_count(threads) if worth else 0
+        self.gave_up: set[int] = set()
+        self._seconds, self._lock, self._closed = seconds, threading.Lock(), False
+        self._spent: dict[int, float] = {}
+        self._processes = [XatlasProcess() for _ in range(processes)]
+        self._idle: queue.SimpleQueue[XatlasProcess] = queue.SimpleQueue()
+        for process in self._processes:
+            self._idle.put(process)
 
-    def __call__(self, vertices: Float, faces: Int) -> tuple[Float, Int]:
-        """Cut a mesh into charts; see `grow_charts`."""
-        if self._spent >= self._seconds:
-            self.gave_up = True
-            return box_charts(vertices, faces)
-        started = time.perf_counter()
-        grown = grow_charts(vertices, faces, self._apart)
-        self._spent += time.perf_counter() - started
-        return grown
+    def __enter__(self) -> PatientGrower:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing; calls that wait for them raise `Cancelled`."""
+        self._closed = True
+        for process in self._processes:
+            process.close()
+
+    def __call__(self, vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
+        """Cut objects into charts; see `grow_charts`."""
+        with self._lock:
+            late = {number for number, spent in self._spent.items() if spent >= self._seconds}
+        if self._seconds <= 0:
+            late.update(mesh.tolist())
+        by_axis = np.isin(mesh, list(late))
+        uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1, dtype=np.int64)
+        if by_axis.any():
+            uv[by_axis], chart[by_axis] = box_charts(vertices, faces[by_axis])
+            self.gave_up.update(np.unique(mesh[by_axis]).tolist())
+        rest = ~by_axis
+        if rest.any():
+            started = time.perf_counter()
+            uv[rest], grown = self._grown(vertices, faces[rest], mesh[rest])
+            chart[rest] = np.where(grown >= 0, grown + chart.max() + 1, -1)
+            self._count_time(mesh[rest], time.perf_counter() - started)
+        return uv, chart
+
+    def _grown(self, vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
+        """Cut in a process, if there is one that works."""
+        if self._processes:
+            process = self._idle.get()
+            try:
+                found = process.run(vertices, faces, mesh)
+            finally:
+                self._idle.put(process)
+            if self._closed:
+                raise Cancelled
+            if found is not None:
+                return found
+        return grow_charts(vertices, faces, mesh)
+
+    def _count_time(self, mesh: Int, seconds: float) -> None:
+        """Share time out by triangles."""
+        numbers, counts = np.unique(mesh, return_counts=True)
+        with self._lock:
+            for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
+                self._spent[number] = self._spent.get(number, 0.0) + seconds * count / len(mesh)

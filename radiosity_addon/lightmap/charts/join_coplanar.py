@@ -22,15 +22,16 @@ _ROUNDS = 2
 """Of pairs that are joined."""
 
 
-def join_coplanar(uv: Float, triangles: Float, chart: Int) -> tuple[Float, Int]:
+def join_coplanar(uv: Float, triangles: Float, chart: Int, owner: Int) -> tuple[Float, Int]:
     """Join pairs of flat charts that share an edge if one box for both is smaller than their two.
 
     uv (n, 3, 2), triangles (n, 3, 3): 1 unit is 1 m.
     chart (n,) int64: −1 for triangles without area.
+    owner (n,) int64: The object of each triangle.
     Returns uv and chart, numbered without gaps.
     """
     for _ in range(_ROUNDS):
-        pairs = _neighbors(triangles, chart)
+        pairs = _neighbors(triangles, chart, owner)
         if not len(pairs):
             break
         into = np.arange(int(chart.max()) + 1)
@@ -43,9 +44,9 @@ def join_coplanar(uv: Float, triangles: Float, chart: Int) -> tuple[Float, Int]:
         normal = np.stack([np.bincount(number, cross[:, k], count) for k in range(3)], axis=-1)
         flat = project(triangles[rows], np.asarray(normal, dtype=np.float64)[number])
         before = _boxes(uv[rows], numbered(chart[rows]))
-        owner = np.zeros(len(before), dtype=np.int64)
-        owner[numbered(chart[rows])] = number
-        worth = _boxes(flat, number) < 0.99 * np.bincount(owner, before, count)
+        pair_of = np.zeros(len(before), dtype=np.int64)
+        pair_of[numbered(chart[rows])] = number
+        worth = _boxes(flat, number) < 0.99 * np.bincount(pair_of, before, count)
         worth[number[overlapping_triangles(flat, number)]] = False
         if not worth.any():
             break
@@ -59,7 +60,7 @@ def join_coplanar(uv: Float, triangles: Float, chart: Int) -> tuple[Float, Int]:
     return uv, chart
 
 
-def _neighbors(triangles: Float, chart: Int) -> Int:
+def _neighbors(triangles: Float, chart: Int, owner: Int) -> Int:
     """Return (p, 2) pairs of flat charts in one plane, each the other's neighbor along the longest edge."""
     rows = np.flatnonzero(chart >= 0)
     count = int(chart.max(initial=-1)) + 1
@@ -70,16 +71,17 @@ def _neighbors(triangles: Float, chart: Int) -> Int:
     flat = np.ones(count, dtype=np.bool_)
     flat[chart[rows[np.linalg.norm(unit[rows] - mean[chart[rows]], axis=1) > _COPLANAR]]] = False
     rows = rows[flat[chart[rows]]]
-    vertex = numbered(triangles[rows].reshape(-1, 3)).reshape(-1, 3)
+    place = np.column_stack((np.repeat(owner[rows], 3), triangles[rows].reshape(-1, 3)))
+    vertex = numbered(place).reshape(-1, 3)
     start, end = vertex.ravel(), np.roll(vertex, -1, axis=1).ravel()
-    owner = np.repeat(chart[rows], 3)
+    side_of = np.repeat(chart[rows], 3)
     length = np.linalg.norm(np.roll(triangles[rows], -1, axis=1) - triangles[rows], axis=2).ravel()
     edge = numbered(np.column_stack((np.minimum(start, end), np.maximum(start, end))))
     order = np.lexsort((start > end, edge))
     twice = np.flatnonzero(np.bincount(edge) == 2)
     first = order[np.searchsorted(edge[order], twice)]
     second = order[np.searchsorted(edge[order], twice) + 1]
-    one, other = owner[first], owner[second]
+    one, other = side_of[first], side_of[second]
     # Along an edge of one surface the two sides run in opposite directions.
     good = (one != other) & ((start > end)[first] != (start > end)[second])
     good &= np.linalg.norm(mean[one] - mean[other], axis=1) <= _COPLANAR

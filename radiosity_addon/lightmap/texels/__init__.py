@@ -8,8 +8,8 @@ from __future__ import annotations
 from .cells import TexelCells
 from .nearest_uncut import whole_neighbor
 from .occlusion import Crossings, below_hood, find_crossings
-from .rasterization import FOOTPRINT, coverage_sum, overlapping_pairs, rasterize
-from .shared_texels import texel_areas
+from .rasterization import FOOTPRINT, coverage_sum, rasterize
+from .shared_texels import is_collapsed, texel_areas
 from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
 from .terminator import SmoothLift
@@ -30,7 +30,7 @@ __all__ = [
     "below_hood",
     "coverage_sum",
     "find_crossings",
-    "overlapping_pairs",
+    "is_collapsed",
     "rasterize",
     "texel_areas",
     "texel_materials",

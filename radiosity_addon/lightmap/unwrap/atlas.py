@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...numerics import numbered, signed_double_areas, triangle_areas
-from ..charts import PIECE, Charts, PatientGrower, rescale_to_area, unwrap
+from ..charts import Charts, PatientGrower, join_charts, rescale_to_area, split_charts, unwrap
 from ..texels import coverage_sum
 from .align import chart_extents
 from .atlas_input import AtlasInput, AtlasOptions
 from .collapse import chart_places
 from .cut_empty import cut_empty_charts
+from .distortion import Stretched, stretched_faces, stretched_warnings
 from .dominant_object import greedy_object, share_of
 from .kept_uvs import are_apart, has_area, is_collapsed, overlaps
 from .packing import Limits, Packing, pack, page_size
@@ -69,6 +70,7 @@ class Atlas:
     objects: tuple[AtlasObject, ...]
     pages: tuple[AtlasPage, ...]
     warnings: tuple[BakeWarning, ...] = ()
+    stretched: tuple[Stretched, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,17 +98,7 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
     if not objects:
         raise BakeError("there is no mesh to lay out: give an object with faces to bake")
     warnings: list[BakeWarning] = []
-    layouts: list[_Layout] = []
-    total = sum(len(source.triangles) for source in objects)
-    done = 0
-    # A density's page is not known yet, and may be as large as any.
-    probe = _PROBE if options.texel_density is not None else min(options.resolution, _PROBE)
-    for source in objects:
-        before, done = done, done + len(source.triangles)
-        part = progress.part(0.7 * before / max(total, 1), 0.7 * done / max(total, 1))
-        layouts.append(_lay_flat(source, probe, warnings, options, part))
-        part.at(1.0)
-
+    layouts = _lay_flat(objects, options, warnings, progress.part(0.0, 0.7))
     layouts = _cut_empty(layouts, options)
     laid = _lay_on_pages(layouts, options, progress.part(0.7, 1.0))
     placed: list[AtlasObject | None] = [None] * len(layouts)
@@ -117,7 +109,26 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
         for each, uv in zip(group, np.split(packing.uv, ends[:-1]), strict=True):
             placed[each] = AtlasObject(uv, number)
     pages = tuple(_page(packing) for _, packing in laid)
-    return Atlas(tuple(each for each in placed if each is not None), pages, tuple(warnings))
+    all_placed = tuple(each for each in placed if each is not None)
+    stretched = _stretched(layouts, all_placed, pages)
+    return Atlas(all_placed, pages, (*warnings, *stretched_warnings(stretched)), tuple(stretched))
+
+
+def _stretched(
+    layouts: list[_Layout], placed: tuple[AtlasObject, ...], pages: tuple[AtlasPage, ...]
+) -> list[Stretched]:
+    """Return what is stretched of the objects that were laid out here."""
+    found: list[Stretched] = []
+    for layout, each in zip(layouts, placed, strict=True):
+        source = layout.source
+        if not layout.kept and len(source.triangles):
+            triangles = np.asarray(source.triangles, dtype=np.float64)
+            polygon = np.asarray(source.polygon, dtype=np.int64)
+            page = each.page, pages[each.page].resolution
+            found += stretched_faces(
+                source.name, triangles, numbered(polygon), layout.charts.uv, each.uv, page
+            )
+    return found
 
 
 def run_atlas(
@@ -167,17 +178,21 @@ def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
     if density is None:
         pages = options.pages if options.shared else len(layouts)
         density = _totals(layouts, padding).density(float(pages * options.resolution**2))
-    cut = []
-    for layout in layouts:
-        source = layout.source
-        if not layout.kept:
-            size = triangle_areas(np.asarray(source.triangles, dtype=np.float64)) * source.scale**2
-            charts = cut_empty_charts(
-                layout.charts, np.asarray(source.polygon, dtype=np.int64), size, density, padding
-            )
-            layout = replace(layout, charts=charts)
-        cut.append(layout)
-    return cut
+    free = [layout for layout in layouts if not layout.kept]
+    counts = [len(layout.source.triangles) for layout in free]
+    if not sum(counts):
+        return layouts
+    size = np.concatenate(
+        [
+            triangle_areas(np.asarray(each.source.triangles, dtype=np.float64)) * each.source.scale**2
+            for each in free
+        ]
+    )
+    polygon = np.concatenate([np.asarray(each.source.polygon, dtype=np.int64) for each in free])
+    polygon = numbered(np.column_stack((np.repeat(np.arange(len(free)), counts), polygon)))
+    together = join_charts([each.charts for each in free])
+    charts = iter(split_charts(cut_empty_charts(together, polygon, size, density, padding), counts))
+    return [layout if layout.kept else replace(layout, charts=next(charts)) for layout in layouts]
 
 
 def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
@@ -200,30 +215,44 @@ def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress)
 
 
 def _lay_flat(
-    source: AtlasInput, probe: int, warnings: list[BakeWarning], options: AtlasOptions, progress: Progress
-) -> _Layout:
-    """Cut one object into charts, or take the UVs it has."""
-    triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
-    if source.uv is not None:
-        kept = _kept_charts(source, triangles, probe, options, warnings)
-        if kept is not None:
-            return _Layout(source, _scaled(kept, source.scale), kept=True)
-    if not len(triangles):
-        return _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
+    objects: Sequence[AtlasInput], options: AtlasOptions, warnings: list[BakeWarning], progress: Progress
+) -> list[_Layout]:
+    """Cut objects into charts, or take the UVs they have."""
+    # A density's page is not known yet, and may be as large as any.
+    probe = _PROBE if options.texel_density is not None else min(options.resolution, _PROBE)
+    kept = [_kept_charts(source, probe, options, warnings) for source in objects]
+    cut = [source for source, charts in zip(objects, kept, strict=True) if charts is None]
+    found = iter(_unwrapped(cut, options, warnings, progress))
+    return [
+        _Layout(source, _scaled(next(found) if charts is None else charts, source.scale), charts is not None)
+        for source, charts in zip(objects, kept, strict=True)
+    ]
+
+
+def _unwrapped(
+    objects: Sequence[AtlasInput], options: AtlasOptions, warnings: list[BakeWarning], progress: Progress
+) -> list[Charts]:
+    """Cut objects into charts."""
+    counts = [len(source.triangles) for source in objects]
+    if not sum(counts):
+        return [Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0)] * len(objects)
+    triangles = np.concatenate([np.asarray(each.triangles, np.float64).reshape(-1, 3, 3) for each in objects])
+    polygon = np.concatenate([np.asarray(each.polygon, dtype=np.int64) for each in objects])
+    owner = np.repeat(np.arange(len(objects)), counts)
     seconds = options.unwrap_seconds
-    # Pieces of a large object are cut at once: xatlas keeps Python's lock, so in processes of their own.
-    grower = PatientGrower(seconds, progress.in_window or len(triangles) > PIECE)
-    polygon = np.asarray(source.polygon, dtype=np.int64)
-    charts = unwrap(triangles, polygon, grower, progress, options.threads)
-    if grower.gave_up:
+    with PatientGrower(seconds, len(triangles), options.threads, progress.in_window) as grower:
+        charts = unwrap(triangles, polygon, grower, progress, options.threads, owner, grower.close)
+    for number in sorted(grower.gave_up):
+        # Batches are numbered by object.
+        name = objects[number].name
         warnings.append(
             BakeWarning(
-                source.name,
-                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest was cut by face "
+                name,
+                f"object '{name}' took more than {seconds:g} s to unwrap; the rest was cut by face "
                 "direction, which makes more seams: give it a UV layer Lightmap and keep UVs, or simplify it",
             )
         )
-    return _Layout(source, _scaled(charts, source.scale), kept=False)
+    return split_charts(charts, counts)
 
 
 def _scaled(charts: Charts, scale: float) -> Charts:
@@ -232,13 +261,14 @@ def _scaled(charts: Charts, scale: float) -> Charts:
 
 
 def _kept_charts(
-    source: AtlasInput, triangles: Float, probe: int, options: AtlasOptions, warnings: list[BakeWarning]
+    source: AtlasInput, probe: int, options: AtlasOptions, warnings: list[BakeWarning]
 ) -> Charts | None:
-    """Take an object's UVs as one chart at world scale; None, with a warning, if they are useless.
+    """Take an object's UVs as one chart at world scale; None without any, with a warning for useless ones.
 
     Overlaps are searched for on a page of `probe` texels a side.
     """
-    assert source.uv is not None
+    if source.uv is None:
+        return None
     uv = source.uv.astype(np.float64)
     collapsed = options.texel_density is None and is_collapsed(uv, options.resolution)
     if not np.isfinite(uv).all() or not (has_area(uv) or collapsed):
@@ -255,6 +285,7 @@ def _kept_charts(
             BakeWarning(source.name, "its Lightmap UVs overlap; faces that share texels show the same light")
         )
     chart = np.zeros(len(uv), dtype=np.int64)
+    triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
     return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
 
 

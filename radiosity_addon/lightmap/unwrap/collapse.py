@@ -19,7 +19,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
-THIN = 1.0
+THIN = 1.5
 """Texels; what is narrower is collapsed."""
 
 STRETCH = 2.0

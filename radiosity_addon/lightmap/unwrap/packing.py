@@ -47,6 +47,9 @@ bring up to a quarter more of them.
 """
 
 
+SNAP = 0.05
+"""Charts are shrunk by up to this part along a side where that saves a row of cells."""
+
 TRIALS, PRECISION = (12, 40), (1.004, 1.002)
 """Scales tried at most, and the ratio of one that does not fit to one that does: for many charts, for few."""
 
@@ -214,6 +217,13 @@ def _measured(job: _Job, scale: Float, cell: int, side: int) -> tuple[Float, Cha
         too_long = (extent > side * cell) & (extent <= STRETCH * side * cell)
         widen = np.where(too_long, side * cell / extent, widen)
     cells = scale / cell * widen
+    if job.places is not None:
+        taken = job.extent * cells
+        whole = np.floor(taken)
+        cells = (
+            np.where((whole < taken) & (whole > (1.0 - SNAP) * taken), whole / np.maximum(taken, 1e-30), 1.0)
+            * cells
+        )
     return cells, chart_masks(job.uv * cells[job.chart][:, None], job.chart, job.extent * cells)
 
 

@@ -10,8 +10,11 @@ import numpy as np
 
 from ...numerics import Array
 
-FULL = 0.75
+FULL = 0.93
 """Share of a page that charts fill with the gaps around them; the rest is odd corners."""
+
+_HALVINGS = 60
+"""Of the bracket around a density."""
 
 
 @dataclass(frozen=True)
@@ -22,28 +25,37 @@ class ChartTotals:
     length: (n,) float, width plus height of each chart's box [m].
     count: (n,) float, number of charts.
     padding: Free texels between charts.
+    most_gaps: Gaps of one texel take no more than this part of the surface's texels, however many charts
+        there are: what is smaller than a texel needs none, and small charts lie in the hollows of others.
     """
 
     area: Array
     length: Array
     count: Array
     padding: int
+    most_gaps: float = 1.0
 
     def texels(self, density: float) -> Array:
         """Return (n,) texels that each object takes at `density` texels per meter, with gaps and corners."""
         gap = self.padding + 1  # a chart's border also cuts through texels
-        return (self.area * density**2 + gap * self.length * density + gap**2 * self.count) / FULL
+        surface, most = self.area * density**2, self.most_gaps * gap * self.area * density**2
+        gaps = gap * self.length * density + gap**2 * self.count
+        return np.asarray((surface + gaps * most / np.maximum(gaps + most, 1e-300)) / FULL)
 
     def density(self, texels: float) -> float:
         """Return the texels per meter at which all objects fill `texels`; 0 if they have no area."""
-        area, gap = float(self.area.sum()), self.padding + 1
+        area = float(self.area.sum())
         if area <= 0.0:
             return 0.0
-        linear, room = gap * float(self.length.sum()), FULL * texels - gap**2 * float(self.count.sum())
-        if room <= 0.0:
-            # Not even the gaps fit: such a page is packed at twice its size and shrunk.
-            return 0.5 * self.density(4.0 * texels)
-        return float(2.0 * room / (linear + np.sqrt(linear**2 + 4.0 * area * room)))
+        high = float(np.sqrt(FULL * texels / area))
+        low = high / float(np.sqrt(1.0 + self.most_gaps * (self.padding + 1)))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if float(self.texels(middle).sum()) > texels:
+                high = middle
+            else:
+                low = middle
+        return low
 
     def least_pages(self, density: float, largest: int) -> int:
         """Return a number of pages, of `largest` texels a side, that all objects may just fit on."""
