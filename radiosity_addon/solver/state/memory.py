@@ -58,7 +58,7 @@ def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     Raises UsageError: See `refuse_many_faces`.
     """
     solid = (scene.areas > 0) & scene.in_bounces
-    refuse_many_faces(int(solid.sum() + (solid & scene.two_sided).sum()), settings)
+    refuse_many_faces(int(solid.sum() + (solid & scene.two_sided & ~scene.sealed).sum()), settings)
 
 
 def refuse_many_faces(faces: int, settings: SolverSettings) -> None:
