@@ -1,8 +1,8 @@
-"""Backs inside closed, opaque solids, which no light reaches and nobody sees: half the sides of a furnished room.
+"""Backs inside closed, opaque solids: half the sides of a furnished room, which no light reaches.
 
-A surface is closed where its edges cancel: each is passed as often in one direction as in the other. Light then
-enters what it encloses only through it. So if it is opaque, its normals point outward, and nothing that shines is
-in the box around it, its backs stay dark.
+A surface is closed where its edges cancel: each is passed as often in one direction as in the other. Light
+then enters what it encloses only through it. So if it is opaque, its normals point outward, and nothing that
+shines is in the box around it, its backs stay dark.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _places(corners: Array) -> Array:
     bits = (corners.reshape(-1, 3) + 0.0).view(np.uint64)  # 0 and −0 are one place
     key: Array = np.zeros(len(bits), dtype=np.uint64)
     for column in bits.T:
-        # One number for three is several times as fast to sort; two places in 10⁷ share one once in 10⁵ scenes.
+        # One number for three is several times as fast to sort; that two places share one is unlikely.
         key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(29)
     return np.unique(key, return_inverse=True)[1].reshape(-1, 3)
@@ -66,8 +66,8 @@ def _places(corners: Array) -> Array:
 def _closed_parts(places: Array) -> tuple[Array, Array]:
     """Return (t,) the part of the surface that each triangle is in, and (parts,) whether it is closed.
 
-    places (t, 3) int: Of the corners. Parts go on where two triangles meet at an edge, not where more do: solids
-    that touch are two.
+    places (t, 3) int: Of the corners. Parts go on where two triangles meet at an edge, not where more do:
+    solids that touch are two.
     """
     count = len(places)
     start, end = places.ravel(), np.roll(places, -1, axis=1).ravel()
