@@ -16,9 +16,9 @@ from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, pa
 from ..numerics import Array, thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
-from ..solver.state import refuse_large_scene, refuse_many_faces
+from ..solver.state import lit_sides
 from .importance import Extent, justified_scales, may_thin_out
-from .quality import quality_of
+from .scene_memory import refuse_many_triangles, solving_bytes, waiting_bytes
 from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
@@ -42,10 +42,9 @@ UNWRAP_SECONDS = 60e-6
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 2900.0, 380.0, 40.0, 30e6
-"""Memory: what rays met is kept while light is swept, more of it in scenes of more triangles, by the power
-0.14; a triangle of the exported scene with its two faces; where texels lie, and their light; the pages
-themselves. What belongs to texels is in files beyond the memory limit."""
+BYTES_A_RAY, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 380.0, 40.0, 30e6
+"""Memory of texels, which is in files beyond the memory limit: what rays met is kept while light is swept,
+more of it in scenes of more triangles, by the power 0.14; where texels lie, and their light; the pages."""
 
 UNSURE = 0.8
 """Pages that follow from a density are refused before they are laid out if so much of their width would."""
@@ -106,12 +105,16 @@ class Estimate:
         return min(sum(self.texels) / max(sum(page**2 for page in self.pages), 1), 1.0)
 
 
-def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings) -> Estimate:
+def estimate_bake(
+    objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings, faces: int | None = None
+) -> Estimate:
     """Reckon what a bake will be.
 
     objects: Those that get a lightmap.
     triangles: Of the whole scene, what only lights and blocks among them.
+    faces: Their sides that take part in the light; None for both of each.
     """
+    faces = 2 * triangles if faces is None else faces
     thinned = _thinned(objects, settings)
     objects = [replace(item, scale=item.scale * scale) for item, scale in zip(objects, thinned, strict=True)]
     pages, texels = _pages(objects, settings)
@@ -124,7 +127,7 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
     # Only what belongs to texels can be in files.
-    of_scene = BYTES_A_TRIANGLE * triangles
+    of_scene = waiting_bytes(triangles, faces)
     most = max(room(settings) - of_scene, least_bytes(pages, settings))
     seconds = None
     if settings.method == "hierarchical" and settings.relative_error is None:
@@ -140,7 +143,7 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
     return Estimate(
         tuple(pages),
         tuple(texels),
-        of_scene + in_memory,
+        max(of_scene + in_memory, solving_bytes(triangles, faces, settings)),
         of_texels - in_memory,
         seconds,
         densities,
@@ -161,22 +164,13 @@ def _thinned(objects: Sequence[LightmappedObject], settings: BakeSettings) -> li
     )
 
 
-def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:
-    """Refuse a scene of so many two-sided triangles that it will not fit into the memory limit.
-
-    Raises UsageError: Names the number of faces, what they need, and what helps.
-    """
-    if settings.method == "hierarchical":
-        refuse_many_faces(2 * triangles, quality_of(settings).solver)
-
-
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
     """Refuse scenes and pages that will not fit into the memory limit, as far as areas give their size.
 
-    Raises UsageError: See `refuse_large_scene` and `refuse_large_pages`.
+    Raises UsageError: See `refuse_many_triangles` and `refuse_large_pages`.
     """
     if settings.method == "hierarchical":
-        refuse_large_scene(bake_scene.scene, quality_of(settings).solver)
+        refuse_many_triangles(len(bake_scene.scene), lit_sides(bake_scene.scene), settings, exported=True)
     sizes = pages_of(settings)
     if sizes is None:
         areas = bake_scene.scene.areas

@@ -11,6 +11,7 @@ from .faces import Faces
 from .opacity import ray_caster
 from .overlaps import OVERLAP, arriving, shares
 from .scene import Scene
+from .sealed_backs import sealed_backs
 from .texture_hash import Glow, glow_pattern, same_glow, texture_digest
 from .textures import CHANNELS, SurfaceImages, where_there
 
@@ -29,6 +30,7 @@ __all__ = [
     "glow_pattern",
     "ray_caster",
     "same_glow",
+    "sealed_backs",
     "shares",
     "texture_digest",
     "where_there",
