@@ -121,6 +121,8 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
         covered = np.flatnonzero(cover >= 0)
         if len(covered) == 0:
             continue
+        # Most pieces of a large side are far from a small cover.
+        covered = covered[_boxes_meet(corners[covered], part[cover[covered]])]
         chosen = cover[covered]
         inner = _clipped(corners[covered], part[chosen])
         met = areas(inner) > NOTHING_LEFT
@@ -146,6 +148,17 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
     rows = np.flatnonzero(kept)
     rows = rows[np.argsort(own[rows], kind="stable")]
     return OwnParts(sides, sides[own[rows]], corners[rows], level[rows])
+
+
+def _boxes_meet(triangles: Array, polygons: Array) -> Array:
+    """Return (n,) whether the boxes around triangles (n, 3, 2) and polygons (n, k, 2) meet."""
+    meet = np.ones(len(triangles), dtype=bool)
+    for axis in range(2):
+        one, other = triangles[..., axis].T, polygons[..., axis].T
+        # Corner by corner: several times as fast as a reduction over a short axis.
+        meet &= np.minimum.reduce(one) <= np.maximum.reduce(other)
+        meet &= np.minimum.reduce(other) <= np.maximum.reduce(one)
+    return meet
 
 
 def _clipped(triangles: Array, polygons: Array) -> Array:
