@@ -27,24 +27,28 @@ CHARTS = 6.0
 TRIANGLES_A_CHART = 24.0
 """… triangles (the office)."""
 
-RAYS_A_TEXEL = {"draft": 27.0, "medium": 48.0, "high": 140.0}
-"""Rays for each texel in a scene of one triangle; in others by the fourth root of their number."""
+RAYS_A_TEXEL, RAYS_AT_EDGES = 40.0, 5200.0
+"""Rays for each texel at medium quality: of charts of n texels the first and the second / √n. What stands
+close together has small charts, and texels next to others are divided."""
 
-SECONDS_A_RAY = 1.0e-6
+RAYS = {"draft": 0.55, "medium": 1.0, "high": 2.2}
+"""Times as many rays."""
+
+SECONDS_A_RAY = 0.75e-6
 """On two cores, with all that is done with what a ray meets."""
 
-SOLVE_SECONDS = {"draft": 0.14, "medium": 0.25, "high": 0.5}
+SOLVE_SECONDS = {"draft": 0.065, "medium": 0.1, "high": 0.25}
 """Time to solve a scene of one triangle; others by the number of triangles to the power 0.45."""
 
-UNWRAP_SECONDS = 60e-6
-"""A triangle's time to be unwrapped and found again on the page."""
+UNWRAP_SECONDS, KEPT_SECONDS = 60e-6, 13e-6
+"""A triangle's time to be unwrapped and found again on the page, and if its layout is kept."""
 
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 380.0, 40.0, 30e6
-"""Memory of texels, which is in files beyond the memory limit: what rays met is kept while light is swept,
-more of it in scenes of more triangles, by the power 0.14; where texels lie, and their light; the pages."""
+BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 140.0, 380.0, 40.0, 30e6
+"""Memory of texels, which is in files beyond the memory limit: what a ray met is kept while light is swept,
+more of it in small charts, as with rays; where texels lie, and their light; the pages."""
 
 UNSURE = 0.8
 """Pages that follow from a density are refused before they are laid out if so much of their width would."""
@@ -74,7 +78,9 @@ class LightmappedObject:
 
     @property
     def charts(self) -> float:
-        """About how many charts it has."""
+        """About how many charts it has; of a layout that is kept nothing is known, and people make few."""
+        if self.keeps_uvs:
+            return min(self.triangles / 2.0, CHARTS)
         return max(min(self.triangles / 2.0, CHARTS), self.triangles / TRIANGLES_A_CHART)
 
 
@@ -119,10 +125,11 @@ def estimate_bake(
     objects = [replace(item, scale=item.scale * scale) for item, scale in zip(objects, thinned, strict=True)]
     pages, texels = _pages(objects, settings)
     total = sum(texels)
-    rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
+    crowded = math.sqrt(sum(item.charts for item in objects) / max(total, 1.0))
+    rays = total * RAYS[settings.quality] * (RAYS_A_TEXEL + RAYS_AT_EDGES * crowded)
     of_texels = (
         BYTES_AT_LEAST
-        + BYTES_A_RAY * max(triangles, 1) ** 0.14 * rays
+        + (BYTES_A_RAY + BYTES_AT_EDGES * crowded) * rays
         + BYTES_A_TEXEL * total
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
@@ -134,7 +141,9 @@ def estimate_bake(
         solving = SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45
         gathering = SECONDS_A_RAY * rays
         cores = thread_count(settings.threads)
-        seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
+        kept = sum(item.triangles for item in objects if item.keeps_uvs)
+        laying_out = UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept
+        seconds = laying_out + (solving + gathering) * (CORES / cores) ** 0.6
     in_memory = min(of_texels, most)
     densities = tuple(
         math.sqrt(count / item.area) if item.area > 0 else 0.0
