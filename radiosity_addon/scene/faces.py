@@ -26,9 +26,10 @@ class Faces:
         solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
         self.left_out = np.zeros(len(scene), dtype=bool) if left_out is None else left_out
         """(t,) bool"""
-        self.has_black_backs = not bool(scene.two_sided[solid].all())
-        """Whether light is lost at backs: at those left out none arrives"""
-        backs = solid[scene.two_sided[solid] & ~self.left_out[solid]]
+        has_back = scene.two_sided[solid] & ~self.left_out[solid]
+        self.has_black_backs = not bool(has_back.all())
+        """Whether rays may end on backs without a face: below a solid that stands on a floor, too"""
+        backs = solid[has_back]
         self.triangle = np.concatenate([solid, backs]).astype(np.int32)
         """(f,) int32"""
         self.front = np.arange(len(self.triangle)) < len(solid)
