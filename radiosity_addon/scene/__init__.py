@@ -6,12 +6,12 @@ Also which of several surfaces in one place counts, and rays that pass through c
 from __future__ import annotations
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene
+from .closed_solids import sealed_backs
 from .coincident_faces import coincident_triangles
 from .faces import Faces
 from .opacity import ray_caster
 from .overlaps import OVERLAP, arriving, shares
 from .scene import Scene
-from .sealed_backs import sealed_backs
 from .texture_hash import Glow, glow_pattern, same_glow, texture_digest
 from .textures import CHANNELS, SurfaceImages, where_there
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..base import SceneError
 from ..lights import Light
 from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array, double_area_vectors
+from .closed_solids import sealed_backs
 from .layers import Layers
-from .sealed_backs import sealed_backs
 from .textures import SurfaceImages
 
 
