@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 from .bake_warnings import coincident_counts, of_coincident
-from .estimate import Estimate, LightmappedObject, estimate_bake, refuse_many_triangles
+from .estimate import Estimate, LightmappedObject, estimate_bake
 from .importance import thinned_out
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
+from .scene_memory import refuse_many_triangles
 from .stages import timed
 from .texel_memory import pages_of, refuse_large_pages
 

@@ -16,9 +16,9 @@ from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, pa
 from ..numerics import Array, thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
-from ..solver.state import refuse_large_scene, refuse_many_faces
+from ..solver.state import lit_sides
 from .importance import Extent, justified_scales, may_thin_out
-from .quality import quality_of
+from .scene_memory import refuse_many_triangles, solving_bytes, waiting_bytes
 from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
@@ -32,25 +32,31 @@ MOST_GAPS = 0.12
 what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
 utilization and texels per meter are right within 10 % there."""
 
-RAYS_A_TEXEL = {"draft": 27.0, "medium": 48.0, "high": 140.0}
-"""Rays for each texel in a scene of one triangle; in others by the fourth root of their number."""
+RAYS_A_TEXEL, RAYS_AT_EDGES = 40.0, 5200.0
+"""Rays for each texel at medium quality: of charts of n texels the first and the second / √n. What stands
+close together has small charts, and texels next to others are divided."""
 
-SECONDS_A_RAY = 1.0e-6
+RAYS = {"draft": 0.55, "medium": 1.0, "high": 2.2}
+"""Times as many rays."""
+
+SECONDS_A_RAY = 0.75e-6
 """On two cores, with all that is done with what a ray meets."""
 
-SOLVE_SECONDS = {"draft": 0.14, "medium": 0.25, "high": 0.5}
+SOLVE_SECONDS = {"draft": 0.065, "medium": 0.1, "high": 0.25}
 """Time to solve a scene of one triangle; others by the number of triangles to the power 0.45."""
 
-UNWRAP_SECONDS = 60e-6
-"""A triangle's time to be unwrapped and found again on the page."""
+UNWRAP_SECONDS, KEPT_SECONDS = 60e-6, 13e-6
+"""A triangle's time to be unwrapped and found again on the page, and if its layout is kept."""
 
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 2900.0, 380.0, 40.0, 30e6
-"""Memory: what rays met is kept while light is swept, more of it in scenes of more triangles, by the power
-0.14; a triangle of the exported scene with its two faces; where texels lie, and their light; the pages
-themselves. What belongs to texels is in files beyond the memory limit."""
+KEPT_RAYS = {"draft": 0.7, "medium": 1.0, "high": 1.6}
+"""Times as many rays of which is kept what they met, …"""
+
+BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 140.0, 380.0, 40.0, 30e6
+"""… memory of texels, which is in files beyond the memory limit: what a ray met is kept while light is swept,
+more of it in small charts, as with rays; where texels lie, and their light; the pages."""
 
 UNSURE = 0.8
 """Pages that follow from a density are refused before they are laid out if so much of their width would."""
@@ -80,7 +86,9 @@ class LightmappedObject:
 
     @property
     def charts(self) -> float:
-        """About how many charts it has."""
+        """About how many charts it has; of a layout that is kept nothing is known, and people make few."""
+        if self.keeps_uvs:
+            return min(self.triangles / 2.0, CHARTS)
         return max(min(self.triangles / 2.0, CHARTS), self.triangles / TRIANGLES_A_CHART)
 
 
@@ -111,32 +119,39 @@ class Estimate:
         return min(sum(self.texels) / max(sum(page**2 for page in self.pages), 1), 1.0)
 
 
-def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings) -> Estimate:
+def estimate_bake(
+    objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings, faces: int | None = None
+) -> Estimate:
     """Reckon what a bake will be.
 
     objects: Those that get a lightmap.
     triangles: Of the whole scene, what only lights and blocks among them.
+    faces: Their sides that take part in the light; None for both of each.
     """
+    faces = 2 * triangles if faces is None else faces
     thinned = _thinned(objects, settings)
     objects = [replace(item, scale=item.scale * scale) for item, scale in zip(objects, thinned, strict=True)]
     pages, texels = _pages(objects, settings)
     total = sum(texels)
-    rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
+    crowded = math.sqrt(sum(item.charts for item in objects) / max(total, 1.0))
+    rays = total * (RAYS_A_TEXEL + RAYS_AT_EDGES * crowded)
     of_texels = (
         BYTES_AT_LEAST
-        + BYTES_A_RAY * max(triangles, 1) ** 0.14 * rays
+        + (BYTES_A_RAY + BYTES_AT_EDGES * crowded) * KEPT_RAYS[settings.quality] * rays
         + BYTES_A_TEXEL * total
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
     # Only what belongs to texels can be in files.
-    of_scene = BYTES_A_TRIANGLE * triangles
+    of_scene = waiting_bytes(triangles, faces)
     most = max(room(settings) - of_scene, least_bytes(pages, settings))
     seconds = None
     if settings.method == "hierarchical" and settings.relative_error is None:
         solving = SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45
-        gathering = SECONDS_A_RAY * rays
+        gathering = SECONDS_A_RAY * RAYS[settings.quality] * rays
         cores = thread_count(settings.threads)
-        seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
+        kept = sum(item.triangles for item in objects if item.keeps_uvs)
+        laying_out = UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept
+        seconds = laying_out + (solving + gathering) * (CORES / cores) ** 0.6
     in_memory = min(of_texels, most)
     densities = tuple(
         math.sqrt(count / item.area) if item.area > 0 else 0.0
@@ -145,7 +160,7 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
     return Estimate(
         tuple(pages),
         tuple(texels),
-        of_scene + in_memory,
+        max(of_scene + in_memory, solving_bytes(triangles, faces, settings)),
         of_texels - in_memory,
         seconds,
         densities,
@@ -166,22 +181,13 @@ def _thinned(objects: Sequence[LightmappedObject], settings: BakeSettings) -> li
     )
 
 
-def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:
-    """Refuse a scene of so many two-sided triangles that it will not fit into the memory limit.
-
-    Raises UsageError: Names the number of faces, what they need, and what helps.
-    """
-    if settings.method == "hierarchical":
-        refuse_many_faces(2 * triangles, quality_of(settings).solver)
-
-
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
     """Refuse scenes and pages that will not fit into the memory limit, as far as areas give their size.
 
-    Raises UsageError: See `refuse_large_scene` and `refuse_large_pages`.
+    Raises UsageError: See `refuse_many_triangles` and `refuse_large_pages`.
     """
     if settings.method == "hierarchical":
-        refuse_large_scene(bake_scene.scene, quality_of(settings).solver)
+        refuse_many_triangles(len(bake_scene.scene), lit_sides(bake_scene.scene), settings, exported=True)
     sizes = pages_of(settings)
     if sizes is None:
         areas = bake_scene.scene.areas

@@ -24,7 +24,7 @@ from ..lightmap.lighting import (
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas
-from ..numerics import Array, Scratch, tiles
+from ..numerics import Array, Scratch, give_back, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
@@ -124,6 +124,7 @@ def _bake(
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
+    give_back()  # what the export freed
     refuse_before_unwrapping(bake_scene, settings)
     part = progress.stage("unwrap", UNWRAP, RASTERIZE)
     part.at(0.0)
@@ -135,9 +136,11 @@ def _bake(
     scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas, scratch)
+    give_back()
     with timed(seconds, "solve"):
         solution = solve_scene(bake_scene, quality.solver, progress.part(SOLVE, LIGHT))
     progress.stage("light", LIGHT, ENCODE).at(0.0)
+    give_back()
     is_shown = share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
         so_far = LightSoFar() if is_shown and len(geometry) <= MOST_SHOWN else None
@@ -156,6 +159,7 @@ def _bake(
     solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
     del solution  # its elements take as much as seams need
+    give_back()
     part = progress.part(ENCODE, 1.0)
     return finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds, part)
 

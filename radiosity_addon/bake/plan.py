@@ -154,12 +154,18 @@ def plan_bake(
 def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
     """Return the names of the objects that are elsewhere than when the bake was kept.
 
-    Raises SceneError if anything else differs, or the kept bake lacks what updating it needs.
+    Raises SceneError if anything else differs, or the kept bake lacks what updating it needs: also the
+    insides of solids that light may reach now.
     """
     if kept.moves is None:
         raise SceneError("the kept bake can be relit, but nothing in it moved: bake again")
     diff = compare(kept.record, scene_record(bake_scene))
     diff.refuse_all_but({Part.PLACE})
+    opened = _opened(kept, bake_scene)
+    if opened:
+        raise SceneError(
+            f"light may now reach the inside of object '{opened[0]}', which the kept bake lacks: bake again"
+        )
     return diff[Part.PLACE]
 
 
@@ -167,7 +173,16 @@ def _moved_alone(kept: KeptBake, bake_scene: BakeScene, settings: BakeSettings) 
     """Return whether updating a kept bake gives what a bake of the scene would."""
     if kept.moves is None or kept.settings != settings:
         return False
-    return compare(kept.record, scene_record(bake_scene)).parts == {Part.PLACE}
+    if compare(kept.record, scene_record(bake_scene)).parts != {Part.PLACE}:
+        return False
+    return not _opened(kept, bake_scene)
+
+
+def _opened(kept: KeptBake, bake_scene: BakeScene) -> list[str]:
+    """Return the objects whose insides were left out of a kept bake, and are not sealed any more."""
+    left_out = kept.solved.local.elements.hierarchy.faces.left_out
+    opened = left_out & ~bake_scene.scene.sealed
+    return [item.name for item in bake_scene.objects if opened[item.rows].any()]
 
 
 def _gone(shown: ShownBake, digests: BakeDigests) -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from .arrays import Array
 from .bilinear import texels_around
 from .discrete import pick_in_rows, pick_in_runs, running_sums
+from .heap import give_back
 from .meshes import connected_components, connected_faces, numbered, weld
 from .parallel import fill_chunks, map_chunks, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
@@ -81,6 +82,7 @@ __all__ = [
     "fill_chunks",
     "flux_of_radiance",
     "folder",
+    "give_back",
     "hash_keys",
     "intensity_of_flux",
     "irradiance_from_point",

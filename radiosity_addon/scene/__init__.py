@@ -6,6 +6,7 @@ Also which of several surfaces in one place counts, and rays that pass through c
 from __future__ import annotations
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene
+from .closed_solids import sealed_backs
 from .coincident_faces import coincident_triangles
 from .faces import Faces
 from .opacity import ray_caster
@@ -29,6 +30,7 @@ __all__ = [
     "glow_pattern",
     "ray_caster",
     "same_glow",
+    "sealed_backs",
     "shares",
     "texture_digest",
     "where_there",

@@ -14,14 +14,22 @@ NO_FACE = -1
 class Faces:
     """The f sides of the scene's triangles that take part: fronts first, then backs.
 
-    Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`.
+    Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`, except those
+    that are left out.
+
+    left_out (t,) bool: Backs that no light reaches, as from `Scene.sealed`; None for none.
     """
 
     STORED = ("triangle", "normal", "center", "area")
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, left_out: Array | None = None) -> None:
         solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
-        backs = solid[scene.two_sided[solid]]
+        self.left_out = np.zeros(len(scene), dtype=bool) if left_out is None else left_out
+        """(t,) bool"""
+        has_back = scene.two_sided[solid] & ~self.left_out[solid]
+        self.has_black_backs = not bool(has_back.all())
+        """Whether rays may end on backs without a face: below a solid that stands on a floor, too"""
+        backs = solid[has_back]
         self.triangle = np.concatenate([solid, backs]).astype(np.int32)
         """(f,) int32"""
         self.front = np.arange(len(self.triangle)) < len(solid)

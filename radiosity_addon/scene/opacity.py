@@ -155,7 +155,7 @@ class CutOutCaster:
         while len(ways.ray):
             at, hits = ways.meet()
             opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
-            np.multiply.at(share, ways.ray[at], 1.0 - opacity)
+            self._multiply(share, ways.ray[at], 1.0 - opacity)
             ways.keep(share[ways.ray] > 0.0)
         return share
 
@@ -170,7 +170,7 @@ class CutOutCaster:
         while len(ways.ray):
             at, hits = ways.meet()
             passes = self._images.passes_at(hits.triangle, hits.barycentric)
-            np.multiply.at(share, ways.ray[at], np.clip(passes, least, 1.0 - least))
+            self._multiply(share, ways.ray[at], np.clip(passes, least, 1.0 - least))
             ways.keep(share[ways.ray].any(axis=1))
         return share
 
@@ -188,6 +188,13 @@ class CutOutCaster:
             nearer.tint,
         )
 
+    def _multiply(self, share: Array, ray: Array, by: Array) -> None:
+        """Multiply the shares of rays, each of which is there once unless cut-outs coincide."""
+        if self._stacks is None:
+            share[ray] *= by
+        else:
+            np.multiply.at(share, ray, by)
+
     def _first_there(self, origins: Array, directions: Array, reach: Array) -> Hits:
         """Return the first cut-outs within `reach` that stop the rays."""
         count = len(origins)
@@ -201,15 +208,20 @@ class CutOutCaster:
             at, hits = ways.meet()
             ray = ways.ray[at]
             opacity = self._images.opacity_at(hits.triangle, hits.barycentric)
-            stopped_by = opacity > _drawn(origins[ray], directions[ray], hits.triangle)
+            stopped_by = opacity >= 1.0
+            chance = np.flatnonzero((opacity > 0.0) & ~stopped_by)
+            drawn = _drawn(origins[ray[chance]], directions[ray[chance]], hits.triangle[chance])
+            stopped_by[chance] = opacity[chance] > drawn
             if tint is not None:
                 stopped_by &= ~self._images.clear[hits.triangle]
             stops = np.flatnonzero(stopped_by)
-            # Of several in one place the outermost.
-            ended, first = np.unique(at[stops], return_index=True)
+            if self._stacks is not None:
+                # Of several in one place the outermost.
+                stops = stops[np.unique(at[stops], return_index=True)[1]]
+            ended = at[stops]
             if tint is not None:
-                self._tint(tint, ray, at, hits, opacity, ends=stops[first])
-            stops, stopped = stops[first], ways.ray[ended]
+                self._tint(tint, ray, at, hits, opacity, ends=stops)
+            stopped = ways.ray[ended]
             triangle[stopped], distance[stopped] = hits.triangle[stops], hits.distance[stops]
             barycentric[stopped], front[stopped] = hits.barycentric[stops], hits.front[stops]
             going = np.ones(len(ways.ray), dtype=bool)

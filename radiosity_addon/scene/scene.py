@@ -10,6 +10,7 @@ import numpy as np
 from ..base import SceneError
 from ..lights import Light
 from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array, double_area_vectors
+from .closed_solids import sealed_backs
 from .layers import Layers
 from .textures import SurfaceImages
 
@@ -81,6 +82,14 @@ class Scene:
     def layers(self) -> Layers:
         """The sides that coincident sides cover."""
         return Layers(self)
+
+    @cached_property
+    def sealed(self) -> Array:
+        """(t,) bool: backs inside closed, opaque solids: no light reaches them, and nobody sees them."""
+        solid = self.in_bounces & self.in_shadows
+        if self.images is not None:
+            solid &= ~self.images.cut_out
+        return sealed_backs(self.triangles, solid, self.emission.any(axis=1), self.lights) & self.two_sided
 
     def _average(self, images: SurfaceImages) -> None:
         """Use the images' area means as constants of the textured triangles."""

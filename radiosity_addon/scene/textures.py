@@ -92,8 +92,10 @@ class SurfaceImages:
         self.values = np.maximum(np.where(np.isfinite(self.values), self.values, 0.0), 0.0)
         self.values[..., :3] = np.minimum(self.values[..., :3], MAX_REFLECTANCE)
         self.values[..., 6] = np.minimum(self.values[..., 6], 1.0)
-        self._weighed = self.values.copy()
-        self._weighed[..., :6] *= self.values[..., 6:]
+        self._weighed = self.values
+        if not (self.values[..., 6] == 1.0).all():
+            self._weighed = self.values.copy()
+            self._weighed[..., :6] *= self.values[..., 6:]
         self._opacity = np.ascontiguousarray(self.values[..., 6:])
         if self.passes is not None:
             self.passes = np.clip(np.where(np.isfinite(self.passes), self.passes, 0.0), 0.0, 1.0)

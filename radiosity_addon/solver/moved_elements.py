@@ -31,7 +31,7 @@ def on_scene(hierarchy: Hierarchy, scene: Scene) -> Hierarchy:
         If the scene does not have the same faces.
     """
     moved = copy(hierarchy)
-    moved.faces = Faces(scene)
+    moved.faces = Faces(scene, hierarchy.faces.left_out)
     if not np.array_equal(moved.faces.triangle, hierarchy.faces.triangle):
         raise ValueError("the scenes have different faces")
     count = len(moved.faces)

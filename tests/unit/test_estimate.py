@@ -28,7 +28,7 @@ OFFICE = [Item(f"Thing {number}", 390, 4.0) for number in range(100)]
     + [("cornell", "high")],
 )
 def test_texels_time_and_memory_are_of_the_right_size(case: str, quality: str) -> None:
-    """Within a factor of 2.5 of what was measured, on as many cores."""
+    """Within a factor of 1.5 of what was measured, on as many cores; little memory within one of 2.2."""
     objects = BOX if case == "cornell" else OFFICE
     measured = json.loads((RESULTS / f"{case}.json").read_text())
     (bake,) = (entry for entry in measured["ours"] if entry["label"] == quality)
@@ -36,13 +36,26 @@ def test_texels_time_and_memory_are_of_the_right_size(case: str, quality: str) -
     settings = BakeSettings(resolution=measured["resolution"], quality=quality, threads=cores)
     plan = estimate_bake(objects, measured["triangles"], settings)
     assert plan.seconds is not None
-    for found, expected in (
-        (sum(plan.texels), measured["texels"]),
-        (plan.seconds, bake["seconds"]),
-        # The process takes about 320 MB before it bakes.
-        (plan.memory, 1e6 * max(bake["memory_MB"] - 320, 50)),
+    # The process takes about 320 MB before it bakes.
+    needed = 1e6 * max(bake["memory_MB"] - 320, 50)
+    for found, expected, factor in (
+        (sum(plan.texels), measured["texels"], 1.5),
+        (plan.seconds, bake["seconds"], 1.5),
+        (plan.memory, needed, 2.2 if needed < 3e8 else 1.5),
     ):
-        assert expected / 2.5 < found < 2.5 * expected
+        assert expected / factor < found < factor * expected
+
+
+def test_a_million_triangles_are_of_the_right_size() -> None:
+    """A closed room with a layout of twelve charts."""
+    measured = json.loads((RESULTS / "rooms.json").read_text())
+    bake, cores = measured["bake"], measured["context"]["machine"]["cores"]
+    settings = BakeSettings(resolution=bake["resolution"], quality=measured["quality"], threads=cores)
+    triangles = bake["triangles"]
+    room = [Item("Room", triangles, 94.0, keeps_uvs=True)]
+    plan = estimate_bake(room, triangles, settings, faces=triangles)
+    assert plan.seconds == pytest.approx(bake["seconds"], rel=0.5)
+    assert sum(plan.texels) == pytest.approx(bake["texels"], rel=0.3)
 
 
 def test_pages_follow_a_density() -> None:

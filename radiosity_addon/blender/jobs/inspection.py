@@ -38,7 +38,7 @@ from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
 from .coincident_check import coincident_warnings
-from .lit_objects import PieceShape, glass_materials, lit_objects, piece_shape
+from .lit_objects import PieceShape, glass_materials, lit_objects, lit_sides, piece_shape
 
 if TYPE_CHECKING:
     from ..cycles.lamps import LampFactors
@@ -146,7 +146,8 @@ def inspect(
     shapes = {id(piece): piece_shape(piece) for piece in collected.pieces if len(piece.mesh)}
     lit = lit_objects(chosen, shapes, collected, settings.keep_uvs)
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
-    plan = estimate_bake(lit, triangles, settings)
+    faces = lit_sides(collected.pieces, collected)
+    plan = estimate_bake(lit, triangles, settings, faces)
     refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
     if refused is not None:
         findings.append(Finding(ERROR, "file", refused))
@@ -159,7 +160,7 @@ def inspect(
         *_of_texels(lit, plan),
         *_of_shapes(context, collected, shapes),
         *_of_size(shapes),
-        *_of_memory(plan, sum(len(p.mesh) for p in collected.pieces if p.role.in_bounces), settings),
+        *_of_memory(plan, triangles, faces, settings),
         *(Finding(INFO, warning.name, warning.message) for warning in _more_warnings(collected, chosen)),
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
@@ -344,10 +345,10 @@ def _of_size(shapes: dict[int, PieceShape]) -> Iterator[Finding]:
         )
 
 
-def _of_memory(plan: Estimate, triangles: int, settings: BakeSettings) -> Iterator[Finding]:
+def _of_memory(plan: Estimate, triangles: int, faces: int, settings: BakeSettings) -> Iterator[Finding]:
     """Say whether triangles or pages exceed the memory limit, and whether memory or disk may not do."""
     try:
-        refuse_many_triangles(triangles, settings)
+        refuse_many_triangles(triangles, faces, settings)
         refuse_large_pages(plan.pages, settings)
     except RadiosityError as error:
         yield Finding(ERROR, "memory", str(error))

@@ -9,8 +9,12 @@ import numpy as np
 
 from ...bake import LightmappedObject
 from ...numerics import double_area_vectors, triangle_areas
+from ...scene import sealed_backs
 from ..datablocks.mesh_arrays import world_from_object
 from ..scene_records.pieces import Piece, SceneContents
+
+MANY_SIDES = 200_000
+"""Of fewer sides all are counted: they need little."""
 
 CLOSED = 1e-4
 """A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
@@ -51,6 +55,24 @@ def lit_objects(
         for piece in chosen
         if not len(piece.mesh) or not clear[piece.surface].all()
     ]
+
+
+def lit_sides(pieces: Sequence[Piece], collected: SceneContents) -> int:
+    """Return about how many sides of pieces take part in the light: not the insides of closed solids."""
+    pieces = [piece for piece in pieces if piece.role.in_bounces and len(piece.mesh)]
+    sides = 2 * sum(len(piece.mesh) for piece in pieces)
+    if sides < MANY_SIDES:
+        return sides
+    surface = np.concatenate([piece.surface for piece in pieces])
+    opaque = np.array([one.opacity == 1.0 for one in collected.surfaces])[surface]
+    emits = np.array([one.emission.any() for one in collected.surfaces])[surface]
+    stops = np.repeat([piece.role.in_shadows for piece in pieces], [len(piece.mesh) for piece in pieces])
+    corners = np.concatenate([_in_world(piece) for piece in pieces])
+    return sides - int(sealed_backs(corners, opaque & stops, emits, collected.lights).sum())
+
+
+def _in_world(piece: Piece) -> np.ndarray:
+    return world_from_object(piece.mesh, piece.matrix)[0]
 
 
 def glass_materials(collected: SceneContents) -> list[str]:

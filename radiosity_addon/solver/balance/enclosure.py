@@ -137,8 +137,7 @@ def _arriving(
     normals = normals.reshape(-1, 3)
     directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
     start = points.reshape(-1, 3) + caster.surface_offset * normals
-    has_black_backs = 2 * int(faces.front.sum()) > len(faces)
-    if has_black_backs:
+    if faces.has_black_backs:
         hits = caster.intersect(start, directions)
         missed = hits.triangle < 0
         lost = missed | (faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0)

@@ -151,7 +151,11 @@ class EmitterGroup:
         directions : (n, k, 3), distances : (n, k), weights : (n, k)
         """
         if self._tree is not None:
-            return self._rays_by_tree(self._tree, points, normals, u)
+            starts = range(0, max(len(points), 1), CHUNK_POINTS)
+            chunks = [slice(first, first + CHUNK_POINTS) for first in starts]
+            found = [self._rays_by_tree(self._tree, points[rows], normals[rows], u[rows]) for rows in chunks]
+            directions, distances, weights = (np.concatenate(each) for each in zip(*found, strict=True))
+            return directions, distances, weights
         factors = self.factors(points, normals)
         face, along = pick_in_rows(factors, u[..., 0])
         chosen = np.take_along_axis(factors, face, axis=1)

@@ -40,8 +40,8 @@ class Hierarchy:
         *("area", "reflectance", "emission", "opacity"),
     )
 
-    def __init__(self, scene: Scene) -> None:
-        self.faces = Faces(scene)
+    def __init__(self, scene: Scene, left_out: Array | None = None) -> None:
+        self.faces = Faces(scene, left_out)
         count = len(self.faces)
         # Of the faces themselves there is one copy, which both share (`subdivide`).
         self.corners = self.faces.corners

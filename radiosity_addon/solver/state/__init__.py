@@ -9,12 +9,13 @@ from .anderson import Anderson
 from .iteration import bounce, reflect, relative_residual
 from .link_record import LinkRecord, leaves_on, nearest_leaf, record_links
 from .memory import (
+    least_bytes,
     link_budget,
+    lit_sides,
     most_light_elements,
     refinable,
     refuse_beyond,
     refuse_large_scene,
-    refuse_many_faces,
 )
 from .power import link_closure, power_balance
 from .state import SolverState, begin
@@ -25,9 +26,11 @@ __all__ = [
     "SolverState",
     "begin",
     "bounce",
+    "least_bytes",
     "leaves_on",
     "link_budget",
     "link_closure",
+    "lit_sides",
     "most_light_elements",
     "nearest_leaf",
     "power_balance",
@@ -36,6 +39,5 @@ __all__ = [
     "reflect",
     "refuse_beyond",
     "refuse_large_scene",
-    "refuse_many_faces",
     "relative_residual",
 ]

@@ -55,20 +55,18 @@ def refuse_beyond(limit: float, needed: float, what: str, advice: str) -> None:
 def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     """Refuse a scene whose faces and coarsest first links do not fit into the memory limit.
 
-    Raises UsageError: See `refuse_many_faces`.
-    """
-    solid = (scene.areas > 0) & scene.in_bounces
-    refuse_many_faces(int(solid.sum() + (solid & scene.two_sided).sum()), settings)
-
-
-def refuse_many_faces(faces: int, settings: SolverSettings) -> None:
-    """Refuse so many faces if they and their coarsest first links do not fit into the memory limit.
-
     Raises UsageError: Names the number of faces, what they need, and what helps.
     """
+    faces = lit_sides(scene)
     what = f"the hierarchical method with {faces:,} faces"
     advice = "raise the limit, or bake fewer objects"
     refuse_beyond(settings.memory_limit, least_bytes(faces, settings), what, advice)
+
+
+def lit_sides(scene: Scene) -> int:
+    """Return the number of faces that a scene will have (`Faces`)."""
+    solid = (scene.areas > 0) & scene.in_bounces
+    return int(solid.sum() + (solid & scene.two_sided & ~scene.sealed).sum())
 
 
 def least_bytes(faces: int, settings: SolverSettings) -> float:

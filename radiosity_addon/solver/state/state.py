@@ -156,7 +156,7 @@ def begin(scene: Scene, settings: SolverSettings, kind: type[StateType]) -> Stat
     """Prepare a scene for a method: its faces, its ray caster, and the power of its light."""
     started = time.perf_counter()
     caster = ray_caster(scene, settings.threads)
-    hierarchy = Hierarchy(scene)
+    hierarchy = Hierarchy(scene, scene.sealed)
     power = light_power(scene, hierarchy.faces)
     state = kind(scene, settings, hierarchy, caster, power, started=started)
     state.reset()
