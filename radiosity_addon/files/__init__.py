@@ -22,6 +22,7 @@ from .baked_files import (
 )
 from .file_names import (
     BLEND_NAME,
+    EXPORT_FOLDER,
     LIGHTMAPS,
     PLAIN_NAMES,
     PREVIEW_NAME,
@@ -39,6 +40,7 @@ __all__ = [
     "BAKE",
     "BLEND_NAME",
     "DIGEST",
+    "EXPORT_FOLDER",
     "FILE",
     "KEPT",
     "LIGHTMAPS",

@@ -24,7 +24,7 @@ from ...cli import (
     printable,
     requested_settings,
 )
-from ...options import BakeSettings
+from ...options import BakeSettings, Form, forms_of
 
 EXIT_DONE = 0
 EXIT_FAILED = 1
@@ -56,16 +56,22 @@ def main(
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
             check_keeping(request, settings)
+        wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
+        form = None if wanted is None else forms_of(wanted)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
         return int(help_was_asked.code or 0)
     with Interrupts() if interrupts is None else nullcontext(interrupts) as those:
-        return _run(request, settings, loaded, those)
+        return _run(request, settings, form, loaded, those)
 
 
 def _run(
-    request: argparse.Namespace, settings: BakeSettings | None, loaded: Path | None, interrupts: Interrupts
+    request: argparse.Namespace,
+    settings: BakeSettings | None,
+    form: Form | None,
+    loaded: Path | None,
+    interrupts: Interrupts,
 ) -> int:
     """Run the verb and turn however it ends into an exit code."""
     try:
@@ -109,8 +115,15 @@ def _run(
                     interrupts,
                     preview=not request.no_preview,
                 )
-            else:
+            elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
+            if form is not None:
+                from .export_verb import export
+
+                interrupts.deferred = False
+                export(
+                    request.folder if settings is None else request.output, form, allowed, console, interrupts
+                )
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, EXIT_INTERRUPTED)
     except RadiosityError as error:

@@ -22,7 +22,7 @@ from ...numerics import tiles
 from ...options import OTHERS, BakeSettings
 from ...scene import BakeScene
 from ..datablocks.bake_record import mark_made, remove_datablocks
-from ..datablocks.image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
+from ..datablocks.image_marks import GROUP, LIGHT_PROPERTY, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
 from ..datablocks.png import check_whole
 from ..datablocks.quiet_output import silenced
 
@@ -156,7 +156,7 @@ def write_images(
         for number, (page, file_name) in enumerate(zip(pages, file_names, strict=True)):
             images.append(_new_image(page, settings.format, file_name, scale))
             images[-1][PAGE], images[-1][GROUP] = number, group
-            images[-1][QUANTITY_PROPERTY] = settings.quantity
+            images[-1][QUANTITY_PROPERTY], images[-1][LIGHT_PROPERTY] = settings.quantity, settings.light
             _store(images[-1], folder, file_name)
     except BaseException:
         remove_datablocks(images)
