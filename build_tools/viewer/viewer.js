@@ -23,8 +23,9 @@ async function start() {
   const scene = new Scene();
   scene.background = new Color(0x202224);
   const camera = cameraOf(shiny);
+  const target = targetOf(shiny, camera); // before the controls turn the camera
   const controls = new OrbitControls(camera, renderer.domElement);
-  controls.target.copy(targetOf(shiny, camera));
+  controls.target.copy(target);
   controls.update();
 
   let lit = shiny;
@@ -39,6 +40,7 @@ async function start() {
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(innerWidth, innerHeight);
     camera.aspect = innerWidth / innerHeight;
+    camera.fov = fovFor(shiny, camera.aspect);
     camera.updateProjectionMatrix();
     draw();
   };
@@ -79,11 +81,18 @@ function cameraOf(lit) {
     own.updateWorldMatrix(true, false);
     own.matrixWorld.decompose(camera.position, camera.quaternion, camera.scale);
     camera.scale.set(1, 1, 1);
-    camera.fov = own.fov;
   } else {
     camera.position.copy(box.getCenter(new Vector3())).add(new Vector3(0.6, 0.4, 0.8).multiplyScalar(size));
   }
   return camera;
+}
+
+/** The vertical field of view that shows all that the scene's camera does. */
+function fovFor(lit, aspect) {
+  const own = lit.gltf.cameras.find((each) => each.isPerspectiveCamera);
+  if (!own || aspect >= own.aspect) return own?.fov ?? 50;
+  const tangent = Math.tan(own.fov * Math.PI / 360) * own.aspect / aspect;
+  return Math.min(Math.atan(tangent) * 360 / Math.PI, 100);
 }
 
 /** What to orbit: what the camera looks at, at the distance of the first surface. */
@@ -106,7 +115,7 @@ function exposureFor(lit) {
       if (light > 0 && page) { sum += Math.log(light); count += 1; }
     }
   }
-  return count ? 0.45 / Math.exp(sum / count) : 1;
+  return count ? 0.3 / Math.exp(sum / count) : 1;
 }
 
 function luminance(color) {

@@ -70,6 +70,8 @@ def export_scene(context: bpy.types.Context) -> ExportScene:
     made.made.append(made.scene)
     made.scene.frame_set(context.scene.frame_current)
     made.scene.world = context.scene.world
+    for name in ("resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):  # of the camera's picture
+        setattr(made.scene.render, name, getattr(context.scene.render, name))
     try:
         _Copies(made).add(shown_objects)
     except BaseException:
