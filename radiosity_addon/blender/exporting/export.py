@@ -38,7 +38,7 @@ from ...options import EFFICACY, Form
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
 from .evaluated_colors import evaluate_channel, image_of, side_factor
-from .export_materials import BASE, CHANNELS, EMISSION
+from .export_materials import ALPHA, BASE, CHANNELS, EMISSION
 from .export_scene import PREFIX, ExportScene, export_scene, lamps_in
 from .shown_lightmaps import light_of
 
@@ -204,7 +204,9 @@ def _show_images(scene: ExportScene, colors: _Colors) -> None:
         channels = {channel: colors[channel][page] for channel in needed}
         images, made = image_of(channels, f"Page {page}")
         scene.made += made
+        alpha = channels.get(ALPHA)
         for material in of_page:
+            material.is_cut_out = alpha is not None and bool(((alpha > 0.02) & (alpha < 0.98)).mean() < 0.02)
             material.show_images(images)
 
 

@@ -36,6 +36,7 @@ class ExportMaterial:
     evaluated: The channels whose source glTF cannot express.
     glows: Whether it emits.
     factor: What its emission is multiplied by: that of its light group.
+    is_cut_out: Whether its evaluated alpha is hardly anywhere between 0 and 1.
     """
 
     material: bpy.types.Material
@@ -46,6 +47,7 @@ class ExportMaterial:
     evaluated: set[str]
     glows: bool
     factor: tuple[float, float, float]
+    is_cut_out: bool = False
 
     @property
     def tree(self) -> bpy.types.NodeTree:
@@ -64,6 +66,11 @@ class ExportMaterial:
                 textures[image.name].image, textures[image.name].extension = image, "EXTEND"
                 self.tree.links.new(uv.outputs["UV"], textures[image.name].inputs["Vector"])
             output = textures[image.name].outputs["Alpha" if channel == ALPHA else "Color"]
+            if channel == ALPHA and self.is_cut_out:
+                rounded = self.tree.nodes.new("ShaderNodeMath")
+                rounded.operation = "ROUND"
+                self.tree.links.new(output, rounded.inputs[0])
+                output = rounded.outputs[0]
             self.tree.links.new(output, self.principled.inputs[_INPUTS[channel]])
             if channel == EMISSION:
                 self.principled.inputs["Emission Strength"].default_value = white
@@ -107,6 +114,10 @@ def export_material(
     sources = {BASE: surface.base, EMISSION: surface.emission, ALPHA: surface.alpha}
     glows = bool(surface.glows)
     evaluated = {channel for channel in CHANNELS if not _express(tree, principled, channel, sources[channel])}
+    if ALPHA in evaluated and keeps_shine and _is_cut_out(sources[ALPHA], sources[BASE]):
+        evaluated.discard(ALPHA)
+    if ALPHA in evaluated:
+        evaluated.add(BASE)  # glTF has both in one image
     if EMISSION in evaluated and keeps_shine and _keeps_emission(principled):
         evaluated.discard(EMISSION)
     if not glows:
@@ -156,23 +167,25 @@ def _constant(source: Any, channel: str) -> tuple[float, ...] | None:
     if not isinstance(source, bpy.types.NodeSocket):
         values = (source,) * 3 if channel == ALPHA else source
         return tuple(float(value) for value in values)
-    try:
-        with known_means_only(None):
-            value = evaluate_output(source)
-    except (MissingImageError, NotConstantError):
-        return None
-    return value
-
-
-def evaluate_output(source: bpy.types.NodeSocket) -> tuple[float, ...] | None:
-    """Return the constant that an output has; None where it varies."""
-    probe = source.node.id_data.nodes.new("ShaderNodeEmission")
+    node = source.node
+    if node.type == "VECT_MATH" and node.operation == "SCALE":  # color × strength, as `read_surface` has it
+        color, strength = (_constant_input(node.inputs[name]) for name in ("Vector", "Scale"))
+        return None if color is None or strength is None else tuple(value * strength[0] for value in color)
+    probe = node.id_data.nodes.new("ShaderNodeEmission")
     try:
         probe.id_data.links.new(source, probe.inputs["Color"])
-        value = evaluate(probe.inputs["Color"], ())
-        return None if value.notes else tuple(float(each) for each in value.rgb)
+        return _constant_input(probe.inputs["Color"])
     finally:
         probe.id_data.nodes.remove(probe)
+
+
+def _constant_input(socket: bpy.types.NodeSocket) -> tuple[float, ...] | None:
+    try:
+        with known_means_only(None):
+            value = evaluate(socket)
+    except (MissingImageError, NotConstantError):
+        return None
+    return None if value.notes else tuple(float(each) for each in value.rgb)
 
 
 def is_plain_image(source: Any) -> bool:
@@ -194,6 +207,15 @@ def is_plain_image(source: Any) -> bool:
         vector = feed_of(vector.inputs["Vector"], enter_groups=False).node
         return vector is not None and _is_uv(vector)
     return vector is None or _is_uv(vector)
+
+
+def _is_cut_out(alpha: Any, base: Any) -> bool:
+    """Return whether a source is the rounded alpha of the image that is the base color: glTF's mask."""
+    node = alpha.node if isinstance(alpha, bpy.types.NodeSocket) else None
+    if node is None or node.type != "MATH" or node.operation != "ROUND" or not is_plain_image(base):
+        return False
+    rounded = feed_of(node.inputs[0], enter_groups=False)
+    return rounded.node == base.node and rounded.socket.name == "Alpha"
 
 
 def _is_uv(node: bpy.types.Node) -> bool:

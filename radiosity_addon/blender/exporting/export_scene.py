@@ -190,8 +190,8 @@ def arrange_layers(mesh: bpy.types.Mesh, name: str) -> bool:
     if not has_uvs:
         layers = {FIRST_LAYER: ours}
     first, *others = layers
-    for layer in list(mesh.uv_layers):
-        mesh.uv_layers.remove(mesh.uv_layers[layer.name] if layer.name in mesh.uv_layers else layer)
+    while mesh.uv_layers:
+        mesh.uv_layers.remove(mesh.uv_layers[0])
     for wanted, values in (
         (first, layers[first]),
         (LIGHTMAP_UV_LAYER, ours),
