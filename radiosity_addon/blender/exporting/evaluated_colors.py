@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base import BakeError
 from ...exports import srgb_of_linear
+from ...lightmap.images import dilate
 from ...numerics import Array
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import remove_datablocks
@@ -18,8 +19,6 @@ from .export_materials import ALPHA, BASE, EMISSION, ExportMaterial
 
 MAX_SIDE = 4096
 """Of images: larger ones have as many texels as the lightmap."""
-
-MARGIN = 8
 
 
 def side_factor(side: int) -> int:
@@ -42,7 +41,7 @@ def evaluate_channel(
     Raises BakeError if Cycles did not bake.
     """
     images = [
-        bpy.data.images.new("Radiosity Export", *size, alpha=False, float_buffer=True, is_data=True)
+        bpy.data.images.new("Radiosity Export", *size, alpha=True, float_buffer=True, is_data=True)
         for size in sizes
     ]
     wired = [_Emitting(material, channel, images[material.page]) for material in materials]
@@ -58,8 +57,7 @@ def evaluate_channel(
         ):
             done = bpy.ops.object.bake(
                 type="EMIT",
-                margin=MARGIN,
-                margin_type="EXTEND",
+                margin=0,  # that of an object would cover others next to it
                 use_clear=True,
                 target="IMAGE_TEXTURES",
                 save_mode="INTERNAL",
@@ -156,7 +154,9 @@ def _as_cycles(scene: bpy.types.Scene) -> None:
 
 
 def _pixels(image: bpy.types.Image) -> Array:
+    """Return an image (height, width, 3), dilated from the texels that were evaluated."""
     width, height = image.size
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
-    return np.nan_to_num(pixels.reshape(height, width, 4)[..., :3].copy(), posinf=0.0, neginf=0.0)
+    pixels = np.nan_to_num(pixels.reshape(height, width, 4), posinf=0.0, neginf=0.0)
+    return dilate(np.ascontiguousarray(pixels[..., :3]), pixels[..., 3] > 0.0)

@@ -5,6 +5,7 @@ No rays, no solver.
 
 from __future__ import annotations
 
+from .dilate import dilate
 from .encode import encode_png16, png16_scale, presentable, to_quantity
 from .irradiance_statistics import LightStatistics, light_statistics, lit_texels
 from .page import LightmapPage
@@ -17,6 +18,7 @@ __all__ = [
     "LightmapPage",
     "Seams",
     "SurfaceTiles",
+    "dilate",
     "encode_png16",
     "find_seams",
     "lay_out_again",
