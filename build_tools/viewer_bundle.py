@@ -1,4 +1,4 @@
-"""The viewer's program, bundled with three.js into one file that the extension carries; its output is committed.
+"""The viewer's program, bundled with three.js into one file of the extension; its output is committed.
 
 npm's packages are pinned in `build_tools/viewer` with their digests, and installed in `.envs/viewer`.
 """
@@ -26,7 +26,9 @@ def node_packages(root: Path) -> Path:
     """
     npm = shutil.which("npm")
     if npm is None:
-        raise BuildError("npm is missing: install Node.js 20 or later (Debian: apt-get install -y nodejs npm)")
+        raise BuildError(
+            "npm is missing: install Node.js 20 or later (Debian: apt-get install -y nodejs npm)"
+        )
     place = root / ".envs" / "viewer"
     lock = (root / SOURCE / "package-lock.json").read_bytes()
     stamp, wanted = place / "installed", hashlib.sha256(lock).hexdigest()

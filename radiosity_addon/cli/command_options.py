@@ -38,8 +38,8 @@ class _BakeCommand:
     )
     export: str | None = option(
         None,
-        "Also export into DIR/export, in one or more of these forms, separated by commas: web, glb, godot, unity, "
-        "bevy. Charts get 4 free pixels between them unless --padding or --mip-levels is given",
+        "Also export into DIR/export, in one or more of these forms, separated by commas: web, glb, godot, "
+        "unity, bevy. Charts get 4 free pixels between them unless --padding or --mip-levels is given",
         SECTION,
         metavar="FORM,…",
     )

@@ -5,16 +5,16 @@ Arrays and bytes only; `blender/exporting` makes the scene that is written.
 
 from __future__ import annotations
 
+from .engine_files import static_files
 from .glb import Glb, GlbError
 from .half_exr import read_half_exr, write_half_exr
+from .index_file import INDEX_NAME, GroupEntry, LightmapIndex, NodeEntry, PageEntry, lightmap_index
 from .ktx2 import read_ktx2, write_ktx2
-from .lightmap_index import INDEX_NAME, GroupEntry, LightmapIndex, NodeEntry, PageEntry, lightmap_index
 from .lit_gltf import LIGHTMAP_CHANNEL, ExportedNames, emissive_only, with_lightmaps
 from .pages import resampled
 from .png8 import png_of_linear, srgb_of_linear
 from .shared_exponent import decode_rgb9e5, encode_rgb9e5
-from .static_files import static_files
-from .viewer_page import viewer_page
+from .web_page import viewer_page
 
 __all__ = [
     "INDEX_NAME",

@@ -1,7 +1,7 @@
 """The two glTF files: materials that name their lightmap, and the one that any viewer shows lit.
 
 The glTF standard has no lightmaps. `MOZ_lightmap` is what viewers that know any read; its texture is a file
-next to the .glb, as the standard allows no HDR image in it. The material's `extras` say the same in plain words.
+next to the .glb, as the standard allows no HDR image in it. The material's `extras` say the same.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def emissive_only(
 ) -> Glb:
     """Return a written file in which baked materials emit what leaves them, and reflect nothing.
 
-    pages: For each page, and whether it is of glowing materials, an image in sRGB and the radiance of its white.
+    pages: For each page, and whether it is of glowing materials, an image in sRGB and the radiance of white.
     """
     glb = written.copy()
     _strip(glb.json)

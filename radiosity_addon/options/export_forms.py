@@ -9,6 +9,9 @@ from .choices import EXPORT_FORMS
 
 ENGINES = ("godot", "unity", "bevy")
 
+ENGINE_PADDING = 4
+"""Free texels between charts that bicubic filters, and compressed blocks of 4 × 4, need."""
+
 
 @dataclass(frozen=True)
 class Form:

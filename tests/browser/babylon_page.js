@@ -35,7 +35,7 @@ async function start() {
     baked ? '/export/scene_baked.glb' : '/export/scene.glb', scene);
   container.addAllToScene();
   scene.environmentTexture = null;
-  scene.imageProcessingConfiguration.isEnabled = false;
+  scene.imageProcessingConfiguration.applyByPostProcess = true; // materials write linear values
   const index = await (await fetch('/export/lightmaps.json')).json();
   const pages = await Promise.all(index.pages.map((page) => lightmap(scene, page)));
   for (const material of container.materials) {

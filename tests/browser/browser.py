@@ -61,7 +61,13 @@ class Server:
                 file = program if path == "/program.js" else export / path.removeprefix("/export/")
                 found = page if path == "/" else file.read_bytes() if file.is_file() else None
                 self.send_response(404 if found is None else 200)
-                kind = "text/html" if path == "/" else "text/javascript" if path.endswith(".js") else "application/octet-stream"
+                kind = (
+                    "text/html"
+                    if path == "/"
+                    else "text/javascript"
+                    if path.endswith(".js")
+                    else "application/octet-stream"
+                )
                 self.send_header("Content-Type", kind)
                 self.end_headers()
                 self.wfile.write(found or b"")
@@ -108,4 +114,6 @@ def screenshot(page: Path, target: Path, width: int = 1000, height: int = 700) -
     with tempfile.TemporaryDirectory() as profile:
         command = [chromium(), *OPTIONS, f"--user-data-dir={profile}", f"--window-size={width},{height}"]
         command += ["--virtual-time-budget=20000", f"--screenshot={target}", page.resolve().as_uri()]
-        subprocess.run(command, check=True, timeout=WAIT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run(
+            command, check=True, timeout=WAIT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )

@@ -27,9 +27,6 @@ from ..files.lightmap_reports import images_described
 from ..files.output import OutputFolder
 from .verbs import registered, run_through
 
-GAP_FOR_ENGINES = 4
-"""Texels between charts that engines' bicubic filters and compressed blocks need."""
-
 
 def export(folder: Path, form: Form, allowed: Permissions, console: Console, interrupts: Interrupts) -> None:
     """Export the bake in a folder into its folder `export`.
@@ -65,7 +62,8 @@ def outdated_export(folder: Path, report: dict[str, Any]) -> str | None:
         return None
     if FORMS in exported and is_outdated(exported, digests_of(report, sorted(images_described(report)))):
         forms = ",".join(exported[FORMS])
-        return f"the export in {folder / EXPORT_FOLDER} is older than the lightmaps: export --forms {forms} {folder}"
+        place = folder / EXPORT_FOLDER
+        return f"the export in {place} is older than the lightmaps: run export {folder} --forms {forms}"
     return None
 
 

@@ -10,6 +10,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
+from dataclasses import replace
 from pathlib import Path
 
 from ...base import RadiosityError
@@ -24,7 +25,7 @@ from ...cli import (
     printable,
     requested_settings,
 )
-from ...options import BakeSettings, Form, forms_of
+from ...options import ENGINE_PADDING, BakeSettings, Form, forms_of
 
 EXIT_DONE = 0
 EXIT_FAILED = 1
@@ -58,6 +59,8 @@ def main(
             check_keeping(request, settings)
         wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
         form = None if wanted is None else forms_of(wanted)
+        if settings is not None and form is not None and settings.padding is None and not settings.mip_levels:
+            settings = replace(settings, padding=ENGINE_PADDING)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:

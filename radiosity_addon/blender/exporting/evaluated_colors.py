@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base import BakeError
 from ...exports import srgb_of_linear
-from ...lightmap.images import dilate
+from ...lightmap.images import fill_uncovered
 from ...numerics import Array
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import remove_datablocks
@@ -81,7 +81,9 @@ class _Emitting:
     def __init__(self, material: ExportMaterial, channel: str, image: bpy.types.Image) -> None:
         self._tree = tree = material.tree
         self._principled = material.principled
-        self._output = output_node(tree)
+        output = output_node(tree)
+        assert output is not None
+        self._surface = output.inputs["Surface"]
         self._emission = tree.nodes.new("ShaderNodeEmission")
         source = material.sources[channel]
         if channel == ALPHA and not isinstance(source, bpy.types.NodeSocket):
@@ -92,8 +94,8 @@ class _Emitting:
         self._scaled.inputs[1].default_value = material.factor if channel == EMISSION else (1.0, 1.0, 1.0)
         feed_color(tree, self._scaled.inputs[0], source)
         tree.links.new(self._scaled.outputs["Vector"], color)
-        self._links = [(link.from_socket, link.to_socket) for link in self._output.inputs["Surface"].links]
-        tree.links.new(self._emission.outputs[0], self._output.inputs["Surface"])
+        self._links = [(link.from_socket, link.to_socket) for link in self._surface.links]
+        tree.links.new(self._emission.outputs[0], self._surface)
         self._target = tree.nodes.new("ShaderNodeTexImage")
         self._target.image = image
         self._active, tree.nodes.active = tree.nodes.active, self._target
@@ -159,4 +161,7 @@ def _pixels(image: bpy.types.Image) -> Array:
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
     pixels = np.nan_to_num(pixels.reshape(height, width, 4), posinf=0.0, neginf=0.0)
-    return dilate(np.ascontiguousarray(pixels[..., :3]), pixels[..., 3] > 0.0)
+    colors, known = np.ascontiguousarray(pixels[..., :3]), pixels[..., 3] > 0.0
+    colors[~known] = 0.0
+    fill_uncovered(colors, known)
+    return colors

@@ -88,7 +88,7 @@ def run_export(
             yield Status("lightmaps", 0.6)
             images = light.files()
             files |= images
-            files[INDEX_NAME] = lightmap_index(light.index(scene, context)).encode()
+            files[INDEX_NAME] = lightmap_index(light.index(scene)).encode()
             if form.lit_scene:
                 yield Status("baked glTF", 0.8)
                 pages = _light_pages(scene, light, colors)
@@ -154,7 +154,7 @@ class _Lightmaps:
                 found[f"{stem}.exr"], found[f"{stem}.ktx2"] = write_half_exr(page), write_ktx2(page)
         return found
 
-    def index(self, scene: ExportScene, context: bpy.types.Context) -> LightmapIndex:
+    def index(self, scene: ExportScene) -> LightmapIndex:
         """Return what lightmaps.json says."""
         entries = [
             tuple(_entry(page, stem) for page, stem in zip(pages, stems, strict=True))
@@ -178,7 +178,7 @@ _Colors = dict[str, list[Array]]
 
 
 def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps, *, every: bool) -> _Colors:
-    """Return the channels that are needed, each on all pages: all colors, or those that glTF cannot express."""
+    """Return the channels that are needed, each on all pages: every color, or what glTF cannot express."""
     needed = {channel for each in scene.materials for channel in each.evaluated}
     if every:
         needed |= {BASE} | ({EMISSION} if any(each.glows for each in scene.materials) else set())

@@ -1,7 +1,7 @@
 """Materials as glTF knows them: a Principled shader on constants and images, one for each lightmap material.
 
-What varies in a way that glTF cannot say (procedural textures, mixed shaders) is evaluated by Cycles into images
-in the lightmap's own UVs; see `evaluated_colors.py`.
+What varies in a way that glTF cannot say (procedural textures, mixed shaders) is evaluated by Cycles into
+images in the lightmap's own UVs; see `evaluated_colors.py`.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def export_material(
     constant = read_material(original)
     radiance = radiance_of_radiosity(constant.emission)
     unknown = SurfaceSockets(
-        tuple(constant.reflectance.tolist()), tuple(radiance.tolist()), glows=radiance.any()
+        tuple(constant.reflectance.tolist()), tuple(radiance.tolist()), glows=bool(radiance.any())
     )
     if original is None or not uses_nodes(original):
         _make_plain(made, unknown)

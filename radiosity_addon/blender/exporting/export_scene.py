@@ -1,6 +1,6 @@
 """A temporary scene of what renders show: copies of objects, with lightmaps as engines want them.
 
-The user's objects are not touched. Copies of baked objects have meshes with `Lightmap` as the second UV layer, and
+The user's objects are not touched. Copies of baked objects have meshes whose second UV layer is `Lightmap`, and
 materials that glTF knows. Their names lead back to the user's.
 """
 
@@ -70,7 +70,12 @@ def export_scene(context: bpy.types.Context) -> ExportScene:
     made.made.append(made.scene)
     made.scene.frame_set(context.scene.frame_current)
     made.scene.world = context.scene.world
-    for name in ("resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):  # of the camera's picture
+    for name in (
+        "resolution_x",
+        "resolution_y",
+        "pixel_aspect_x",
+        "pixel_aspect_y",
+    ):  # of the camera's picture
         setattr(made.scene.render, name, getattr(context.scene.render, name))
     try:
         _Copies(made).add(shown_objects)

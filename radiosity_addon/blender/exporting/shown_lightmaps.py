@@ -47,11 +47,13 @@ class ShownLightmaps:
     light: str
 
     def page(self, number: int) -> Array:
-        """Return H/π of a page (height, width, 3) as it is shown: with light groups, mixed by their sliders."""
+        """Return H/π of a page (height, width, 3) as it is shown: light groups mixed by their sliders."""
         if not self.groups:
             return light_of(self.images[number])
-        mixed = sum(np.float32(group.factor) * light_of(group.images[number]) for group in self.groups)
-        return np.asarray(mixed, dtype=np.float32)
+        mixed = np.zeros_like(light_of(self.images[number]))
+        for group in self.groups:
+            mixed += np.array(group.factor, dtype=np.float32) * light_of(group.images[number])
+        return mixed
 
     def factor_of(self, group: str) -> tuple[float, float, float]:
         """Return what the emission of surfaces in a light group is multiplied by."""

@@ -6,7 +6,7 @@ import base64
 import html
 from collections.abc import Mapping
 
-from .static_files import ASSETS
+from .engine_files import ASSETS
 
 TITLE, PROGRAM, DATA = "<!--TITLE-->", "<!--PROGRAM-->", "<!--DATA-->"
 

@@ -1,4 +1,4 @@
-"""lightmaps.json: which node has which part of which lightmap, and in what unit. For every engine's importer."""
+"""lightmaps.json: which node has which part of which lightmap, and in what unit; for engines' importers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class NodeEntry:
 
 @dataclass(frozen=True)
 class GroupEntry:
-    """The lightmaps of one light group, as baked: the pages are the sum of all groups, each times its factor."""
+    """The lightmaps of one light group, as baked: pages are the sum of all groups, each times its factor."""
 
     name: str
     factor: tuple[float, float, float]
