@@ -12,12 +12,13 @@ from .export_forms import ENGINE_PADDING, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Option, option, options_of, plain
 from .panel_settings import PANEL_OPTIONS, RELIGHT_GROUP
-from .sections import ADVANCED, GROUPS, LAST_BAKE, MAIN, SECTIONS, SOLVER, sections_of
+from .sections import ADVANCED, EXPORT, GROUPS, LAST_BAKE, MAIN, SECTIONS, SOLVER, sections_of
 
 __all__ = [
     "ADVANCED",
     "EFFICACY",
     "ENGINE_PADDING",
+    "EXPORT",
     "EXPORT_FORMS",
     "GROUPS",
     "LAST_BAKE",
