@@ -194,6 +194,11 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
     }
 
 
+def evaluated_materials(context: bpy.types.Context, scene: ExportScene) -> None:
+    """Have the temporary scene's materials read images of what glTF cannot express of them."""
+    _show_images(scene, _evaluated(context, scene, _Lightmaps.of(scene), every=False))
+
+
 def _show_images(scene: ExportScene, colors: _Colors) -> None:
     """Have materials read what was evaluated of them."""
     for page in range(len(scene.shown.images)):

@@ -1,7 +1,7 @@
 """A temporary scene of what renders show: copies of objects, with lightmaps as engines want them.
 
-The user's objects are not touched. Copies of baked objects have meshes whose second UV layer is `Lightmap`, and
-materials that glTF knows. Their names lead back to the user's.
+The user's objects are not touched. Copies of baked objects have meshes whose second UV layer is `Lightmap`,
+and materials that glTF knows. Their names lead back to the user's.
 """
 
 from __future__ import annotations
