@@ -1,4 +1,4 @@
-"""Encodings of exports: errors within the bounds of their formats, and what other readers find in the files."""
+"""Encodings of exports: errors within the bounds of their formats, and what readers find in files."""
 
 from __future__ import annotations
 
