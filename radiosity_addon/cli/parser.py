@@ -105,6 +105,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
 def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=checked_folder, metavar="DIR", help="the folder that was baked into")
     _add_options(parser, (*EXPORT_COMMAND.values(), *EVERY_COMMAND.values()))
+    parser.set_defaults(forms=EXPORT_COMMAND["forms"].default)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:

@@ -54,17 +54,22 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
         console.lines([*lines, *(f"note: {note}" for note in made.notes)])
 
 
-def outdated_export(folder: Path, report: dict[str, Any]) -> str | None:
-    """Return a warning if the export next to a bake is of earlier lightmaps."""
+def warn_of_outdated(folder: Path, console: Console) -> None:
+    """Say so if the export next to a bake is of earlier lightmaps."""
     try:
         exported = read_report(folder / EXPORT_FOLDER / REPORT_NAME)
+        report = read_report(folder / REPORT_NAME)
     except (OSError, NoReportError):
-        return None
-    if FORMS in exported and is_outdated(exported, digests_of(report, sorted(images_described(report)))):
+        return
+    digests = digests_of(report, sorted(images_described(report)))
+    if FORMS in exported and is_outdated(exported, digests):
         forms = ",".join(exported[FORMS])
         place = folder / EXPORT_FOLDER
-        return f"the export in {place} is older than the lightmaps: run export {folder} --forms {forms}"
-    return None
+        console.lines(
+            [
+                f"warning: the export in {place} is older than the lightmaps: run export {folder} --forms {forms}"
+            ]
+        )
 
 
 def _report_of(folder: Path) -> dict[str, Any]:

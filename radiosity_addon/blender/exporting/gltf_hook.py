@@ -114,7 +114,7 @@ class LightmapExtension:
     """Names lightmaps in the file: the exporter makes one for each export."""
 
     def gather_material_hook(self, material: Any, blender_material: Any, settings: Settings) -> None:
-        """Name a material's lightmap. Newer exporters pass no material of Blender's: it is known by its name."""
+        """Name a material's lightmap. Exporters of Blender 5.2 pass no material of Blender's: names tell."""
         del blender_material, settings
         known = _now[-1].scene.names.materials if _now else {}
         if material.name not in known:
