@@ -20,6 +20,7 @@ from .baked_files import (
     text_of,
     without,
 )
+from .export_reports import FORMS, LIGHTMAPS_OF, images_described, is_outdated, lightmap_digests
 from .file_names import (
     BLEND_NAME,
     EXPORT_FOLDER,
@@ -42,8 +43,10 @@ __all__ = [
     "DIGEST",
     "EXPORT_FOLDER",
     "FILE",
+    "FORMS",
     "KEPT",
     "LIGHTMAPS",
+    "LIGHTMAPS_OF",
     "LISTED",
     "OWNER",
     "PLAIN_NAMES",
@@ -57,9 +60,12 @@ __all__ = [
     "entries",
     "folded",
     "highest_page",
+    "images_described",
     "is_as_written",
     "is_as_written_steps",
     "is_bake_name",
+    "is_outdated",
+    "lightmap_digests",
     "read_report",
     "reports_in",
     "sealed",

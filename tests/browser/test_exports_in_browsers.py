@@ -127,7 +127,7 @@ def test_the_validator_finds_no_error(exported: Exported) -> None:
     for issues in json.loads(done.stdout):
         assert issues["numErrors"] == 0, issues["messages"]
         warned = {message["code"] for message in issues["messages"] if message["severity"] == 1}
-        assert warned <= {"IMAGE_UNRECOGNIZED_FORMAT"}, "of the lightmap, for which the standard has no format"
+        assert warned <= {"IMAGE_UNRECOGNIZED_FORMAT"}, "the standard has no format for lightmaps"
 
 
 def test_the_viewer_opens_from_the_disk(exported: Exported, tmp_path: Path) -> None:

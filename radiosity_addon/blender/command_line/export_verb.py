@@ -17,13 +17,14 @@ from ...files import (
     REPORT_NAME,
     NoReportError,
     Owner,
+    images_described,
     is_as_written,
+    lightmap_digests,
     read_report,
 )
 from ...options import Form
-from ..exporting.export import FORMS, digests_of, is_outdated, run_export
+from ..exporting.export import run_export
 from ..files.files import open_scene
-from ..files.lightmap_reports import images_described
 from ..files.output import OutputFolder
 from .verbs import registered, run_through
 
@@ -48,28 +49,10 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
             bpy.context.window.scene = scene
         owner = Owner(str(folder / BLEND_NAME), scene.name)
         output = OutputFolder(folder / EXPORT_FOLDER, overwrite=allowed.overwrite, owner=owner)
-        digests = digests_of(report, sorted(images_described(report)))
+        digests = lightmap_digests(report)
         made = run_through(run_export(bpy.context, form, output, digests), console, interrupts)
         lines = [f"exported into {folder / EXPORT_FOLDER}", *(f"  {name}" for name in made.files)]
         console.lines([*lines, *(f"note: {note}" for note in made.notes)])
-
-
-def warn_of_outdated(folder: Path, console: Console) -> None:
-    """Say so if the export next to a bake is of earlier lightmaps."""
-    try:
-        exported = read_report(folder / EXPORT_FOLDER / REPORT_NAME)
-        report = read_report(folder / REPORT_NAME)
-    except (OSError, NoReportError):
-        return
-    digests = digests_of(report, sorted(images_described(report)))
-    if FORMS in exported and is_outdated(exported, digests):
-        forms = ",".join(exported[FORMS])
-        place = folder / EXPORT_FOLDER
-        console.lines(
-            [
-                f"warning: the export in {place} is older than the lightmaps: run export {folder} --forms {forms}"
-            ]
-        )
 
 
 def _report_of(folder: Path) -> dict[str, Any]:

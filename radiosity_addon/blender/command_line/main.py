@@ -121,7 +121,7 @@ def _run(
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
             if form is None and settings is not None:
-                from .export_verb import warn_of_outdated
+                from .outdated_exports import warn_of_outdated
 
                 warn_of_outdated(request.output, console)
             if form is not None:

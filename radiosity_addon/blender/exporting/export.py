@@ -5,7 +5,7 @@ The verb `export`, the option `--export` and the button *Export* all run this.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,7 @@ from ...exports import (
     write_half_exr,
     write_ktx2,
 )
-from ...files import LISTED, PLAIN_NAMES, unique_names
+from ...files import FORMS, LIGHTMAPS_OF, PLAIN_NAMES, unique_names
 from ...numerics import Array
 from ...options import EFFICACY, Form
 from ..datablocks.quiet_output import silenced
@@ -44,8 +44,6 @@ from .shown_lightmaps import light_of
 
 LIT, BAKED, VIEWER = "scene.glb", "scene_baked.glb", "viewer.html"
 REPORT_VERSION = 1
-FORMS, LIGHTMAPS_OF = "export", "lightmaps"
-"""Keys of an export's report: its forms, and the digests of the lightmaps that it was made of."""
 
 
 @dataclass(frozen=True)
@@ -272,15 +270,3 @@ def _light_pages(
             white = max(float(radiance.max(initial=0.0)), 1e-6)
             found[number, glows] = png_of_linear(radiance / white), white
     return found
-
-
-def is_outdated(report: Mapping[str, object], lightmaps: Mapping[str, str]) -> bool:
-    """Return whether an export's report is of other lightmaps than these."""
-    return report.get(LIGHTMAPS_OF) != dict(lightmaps)
-
-
-def digests_of(report: Mapping[str, object], names: Sequence[str]) -> dict[str, str]:
-    """Return the digests that a bake's report lists of its lightmaps."""
-    listed = report[LISTED]
-    assert isinstance(listed, dict)
-    return {name: listed[name]["sha256"] for name in names if name in listed}

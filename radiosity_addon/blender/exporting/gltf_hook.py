@@ -1,8 +1,8 @@
 """File → Export → glTF while lightmaps are shown: Blender's own exporter writes them as our exports do.
 
 Before it reads the scene, baked objects get the meshes and materials of an export for a while; hooks name the
-lightmaps in the file; the lightmaps go next to it. The exporter calls nothing where it fails: then a timer, or
-the next export, puts the objects back.
+lightmaps in the file; the lightmaps go next to it. The exporter calls nothing where it fails: then a timer,
+or the next export, puts the objects back.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ...base import BakeError, RadiosityError
-from ...files import FileNames, NoReportError, read_report
+from ...files import FileNames, NoReportError, is_outdated, read_report
 from ...options import EXPORT_FORMS, Form
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import PAGE, VERSION
@@ -47,8 +47,6 @@ def shown_versions() -> dict[str, str]:
 @fact(unknown=False)
 def is_export_outdated(context: bpy.types.Context) -> bool:
     """Whether the scene's export is of other lightmaps than those that are shown."""
-    from ..exporting.export import is_outdated
-
     folder = export_folder(context)
     if folder is None:
         return False
