@@ -138,10 +138,10 @@ def is_bake_name(name: object) -> bool:
     """
     if not isinstance(name, str):
         return False
-    folder, _, own = name.rpartition("/")
+    folder, slash, own = name.rpartition("/")
     if not own or own.startswith(".") or _FORBIDDEN.search(own):
         return False
-    if folder:
+    if slash:
         return own.endswith(ENGINE_FOLDERS.get(folder, ()))
     if own == BLEND_NAME or own in EXPORT_NAMES or own.endswith(REPORT_NAME):
         return True

@@ -227,6 +227,9 @@ def _to_take_back(staging: Path, target: Path, files: Mapping[str, _FileDigests]
     steps: list[_Step] = []
     for name, file in files.items():
         place, kept = target / name, staging / EARLIER / name
+        for folder in (place.parent, kept.parent):
+            if folder.is_symlink():  # what is in it is somewhere else
+                raise ValueError(name)
         present = _digest_of(place)
         if present == file.old:
             continue
