@@ -90,10 +90,13 @@ def test_a_bake_exports_at_once_with_room_for_filters(run: Run, room: Path, tmp_
     done = run("bake", room, "--output", tmp_path / "out", *QUICK, "--export", "glb")
     assert (done.code, done.err) == (0, "")
     assert set(files_in(tmp_path / "out" / "export")) == GLB
+    assert "texels apart" not in done.out
     done = run("bake", room, "--output", tmp_path / "out", *QUICK)
     assert done.code == 0
     assert "older than the lightmaps" in done.out
-    assert run("export", tmp_path / "out", "--forms", "glb").code == 0
+    done = run("export", tmp_path / "out", "--forms", "glb")
+    assert done.code == 0
+    assert "2 texels apart" in done.out
 
 
 def test_files_of_others_are_never_replaced(run: Run, folder: Path) -> None:

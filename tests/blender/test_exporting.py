@@ -1,4 +1,4 @@
-"""Exports from the panel, by Blender's own exporter, and for other exporters; materials as glTF can have them."""
+"""Exports from the panel, by Blender's own exporter and for others; materials as glTF can have them."""
 
 from __future__ import annotations
 

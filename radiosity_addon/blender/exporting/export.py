@@ -34,7 +34,7 @@ from ...exports import (
 )
 from ...files import FORMS, LIGHTMAPS_OF, PLAIN_NAMES, unique_names
 from ...numerics import Array
-from ...options import EFFICACY, Form
+from ...options import EFFICACY, ENGINE_PADDING, Form
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
 from .evaluated_colors import evaluate_channel, image_of, side_factor
@@ -129,6 +129,11 @@ class _Lightmaps:
         notes = []
         if shown.light == "indirect":
             notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
+        if shown.padding is not None and shown.padding < ENGINE_PADDING:
+            notes.append(
+                f"charts are {shown.padding} texels apart, enough for bilinear filters: for bicubic ones and "
+                f"compressed textures bake with a padding of {ENGINE_PADDING}"
+            )
         return cls(shown.light, pages, groups, stems, tuple(notes))
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from ...base import SceneError
 from ...numerics import Array, radiance_of_radiosity
 from ..datablocks.bake_record import is_made
-from ..datablocks.image_marks import GROUP, LIGHT_PROPERTY, QUANTITY_PROPERTY
+from ..datablocks.image_marks import GROUP, LIGHT_PROPERTY, PADDING_PROPERTY, QUANTITY_PROPERTY
 from ..datablocks.image_values import pixels_of
 from ..images.images import image_scale
 from ..images.light_mixer import KIND, sliders_of
@@ -39,12 +39,14 @@ class ShownLightmaps:
     groups: Light groups, whose images are parallel to `images`; none where there are none.
     page_of: By the name of each lightmap material, its page.
     light: `all`, `direct` or `indirect`.
+    padding: Free texels between charts; None where that is not known.
     """
 
     images: tuple[bpy.types.Image, ...]
     groups: tuple[ShownGroup, ...]
     page_of: dict[str, int]
     light: str
+    padding: int | None = None
 
     def page(self, number: int) -> Array:
         """Return H/π of a page (height, width, 3) as it is shown: light groups mixed by their sliders."""
@@ -87,7 +89,7 @@ def shown_lightmaps(objects: Sequence[bpy.types.Object]) -> ShownLightmaps:
         for row, (name, factor) in enumerate(_factors(copies))
     ]
     light = str(images[0].get(LIGHT_PROPERTY, "all"))
-    return ShownLightmaps(tuple(images), tuple(groups), page_of, light)
+    return ShownLightmaps(tuple(images), tuple(groups), page_of, light, images[0].get(PADDING_PROPERTY))
 
 
 def light_of(image: bpy.types.Image) -> Array:
