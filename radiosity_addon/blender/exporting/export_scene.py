@@ -24,6 +24,9 @@ from .shown_lightmaps import ShownLightmaps, shown_lightmaps
 PREFIX = "radiosity_export_"
 """What names in the temporary scene begin with; those of other add-ons do not."""
 
+TEMPORARY = f"{PREFIX}scene"
+"""Custom property of the temporary scene."""
+
 FIRST_LAYER = "UVMap"
 
 
@@ -32,7 +35,7 @@ class ExportScene:
     """The temporary scene, and what is known of it.
 
     user_scene: The name of the one that it is of.
-    objects mapping of str to Object: The copies by the names of the user's objects.
+    objects mapping of str to Object: The copies by the full names of the user's objects.
     baked: Names of those with a lightmap, with its page.
     """
 
@@ -68,6 +71,7 @@ def export_scene(context: bpy.types.Context) -> ExportScene:
     shown = shown_lightmaps([obj for obj in shown_objects if obj.type == "MESH"])
     made = ExportScene(bpy.data.scenes.new("Radiosity Export"), context.scene.name, shown)
     made.made.append(made.scene)
+    made.scene[TEMPORARY] = True
     made.scene.frame_set(context.scene.frame_current)
     made.scene.world = context.scene.world
     for name in (
@@ -116,15 +120,15 @@ class _Copies:
             copy = obj.copy()
             made.made.append(copy)
             copy.name = f"{PREFIX}{number}"
-            self._nodes[copy.name] = obj.name
-            made.objects[obj.name] = copy
+            self._nodes[copy.name] = obj.name_full
+            made.objects[obj.name_full] = copy
             if copy.instance_type == "COLLECTION":  # what it shows was not baked, or has stand-ins
                 copy.instance_type, copy.instance_collection = "NONE", None
             made.scene.collection.objects.link(copy)
         for obj in objects:
-            copy = made.objects[obj.name]
+            copy = made.objects[obj.name_full]
             if obj.parent is not None:
-                parent = made.objects.get(obj.parent.name)
+                parent = made.objects.get(obj.parent.name_full)
                 if parent is None:
                     copy.parent, copy.matrix_world = None, obj.matrix_world
                 else:
@@ -132,7 +136,7 @@ class _Copies:
                     copy.parent, copy.matrix_parent_inverse = parent, kept
             pages = {self._page(slot.material) for slot in obj.material_slots} - {None}
             if obj.type == "MESH" and pages:
-                made.baked[obj.name] = min(page for page in pages if page is not None)
+                made.baked[obj.name_full] = min(page for page in pages if page is not None)
                 self._prepare(obj, copy)
         made.scene.view_layers[0].update()
         made.materials = list(self._materials.values())

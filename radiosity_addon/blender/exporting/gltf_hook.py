@@ -20,7 +20,7 @@ from ...exports import LIGHTMAP_CHANNEL, write_ktx2
 from ...publishing import replacing
 from ..datablocks.bake_record import remove_datablocks
 from .export import evaluated_materials
-from .export_scene import ExportScene, export_scene
+from .export_scene import TEMPORARY, ExportScene, export_scene
 
 WRITER = b"Radiosity Lightmaps"
 """In each KTX2 file of ours: by it an earlier one is known, which may be replaced."""
@@ -47,7 +47,7 @@ def before(settings: Settings) -> None:
     """Give baked objects what is to be exported; called by the exporter."""
     put_back()
     context = bpy.context
-    if context.scene is None or context.scene.name.startswith("Radiosity Export"):
+    if context.scene is None or context.scene.get(TEMPORARY) is not None:
         return  # our own export
     try:
         scene = export_scene(context)
@@ -58,7 +58,7 @@ def before(settings: Settings) -> None:
         dressed = _Dressed(scene)
         _write_lightmaps(dressed, Path(settings["gltf_filepath"]))
         meshes = {name: scene.objects[name].data for name in scene.baked}
-        objects = [(bpy.data.objects[name], mesh) for name, mesh in meshes.items()]
+        objects = [(obj, meshes[obj.name_full]) for obj in bpy.data.objects if obj.name_full in meshes]
         # By default all scenes of the file are exported.
         temporary = [*scene.objects.values(), scene.scene]
         scene.made = [block for block in scene.made if block not in temporary]
