@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import os
 import shutil
 import subprocess
 import tempfile
 import threading
+import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from queue import Empty, Queue
+from typing import Any
 from urllib.parse import urlencode, urlsplit
 
 import numpy as np
@@ -110,10 +115,80 @@ def drawn(export: Path, program: Path, width: int, height: int, **asked: str) ->
 
 
 def screenshot(page: Path, target: Path, width: int = 1000, height: int = 700) -> None:
-    """Take a picture of a page that is opened from the disk."""
-    with tempfile.TemporaryDirectory() as profile:
+    """Take a picture of a viewer that is opened from the disk, once it has loaded its scene."""
+    with tempfile.TemporaryDirectory() as profile, _Remote(profile, width, height) as browser:
+        session = browser.opened(page.resolve().as_uri())
+        until = time.monotonic() + WAIT
+        while browser.evaluated(session, "typeof viewer") != "object":
+            message = browser.evaluated(session, "document.getElementById('message').textContent")
+            assert time.monotonic() < until, f"the viewer says: {message}"
+            assert "cannot" not in message, message
+            time.sleep(0.2)
+        picture = browser.call("Page.captureScreenshot", session=session)["data"]
+        target.write_bytes(base64.b64decode(picture))
+
+
+class _Remote:
+    """A Chromium that is driven by its DevTools protocol, over pipes."""
+
+    def __init__(self, profile: str, width: int, height: int) -> None:
+        read_by_it, self._write = os.pipe()
+        self._read, written_by_it = os.pipe()
         command = [chromium(), *OPTIONS, f"--user-data-dir={profile}", f"--window-size={width},{height}"]
-        command += ["--virtual-time-budget=20000", f"--screenshot={target}", page.resolve().as_uri()]
-        subprocess.run(
-            command, check=True, timeout=WAIT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        # It wants these two numbers.
+        redirect = f'exec 3<&{read_by_it} 4>&{written_by_it}; exec "$@"'
+        self._process = subprocess.Popen(
+            ["bash", "-c", redirect, "bash", *command, "--remote-debugging-pipe"],
+            pass_fds=(read_by_it, written_by_it),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
+        os.close(read_by_it)
+        os.close(written_by_it)
+        self._size = width, height
+        self._answers = os.fdopen(self._read, "rb")
+        self._number = 0
+
+    def __enter__(self) -> _Remote:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        self._process.wait()
+        self._answers.close()
+        os.close(self._write)
+
+    def call(self, method: str, session: str = "", **parameters: Any) -> Any:
+        """Call a method and return its result."""
+        self._number += 1
+        message = {"id": self._number, "method": method, "params": parameters}
+        os.write(
+            self._write,
+            json.dumps({**message, **({"sessionId": session} if session else {})}).encode() + b"\0",
+        )
+        while True:
+            answer = json.loads(self._message())
+            if answer.get("id") == self._number:
+                assert "error" not in answer, answer["error"]
+                return answer["result"]
+
+    def opened(self, address: str) -> str:
+        """Open a page; returns its session."""
+        width, height = self._size
+        target = self.call("Target.createTarget", url=address)["targetId"]
+        session: str = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", session, **size)
+        return session
+
+    def evaluated(self, session: str, expression: str) -> Any:
+        """Evaluate an expression in a page."""
+        result = self.call("Runtime.evaluate", session, expression=expression, returnByValue=True)
+        return result["result"].get("value")
+
+    def _message(self) -> bytes:
+        found = bytearray()
+        while (byte := self._answers.read(1)) != b"\0":
+            assert byte, "Chromium has ended"
+            found += byte
+        return bytes(found)
