@@ -16,7 +16,7 @@ import numpy as np
 
 from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.exports import read_ktx2
-from tests.browser.browser import screenshot
+from tests.browser.browser import viewer
 from tests.browser.textured_room import build
 
 IMAGES = Path(__file__).parents[1] / "images"
@@ -32,7 +32,8 @@ def pictures(folder: Path) -> None:
         bake = ["bake", str(folder / "room.blend"), "--output", str(out), "--resolution", "512"]
         if main([*bake, "--no-preview", "--export", "web"]):
             raise SystemExit("the bake failed")
-    screenshot(out / "export" / "viewer.html", IMAGES / "export-viewer.png", WIDTH, HEIGHT)
+    with viewer(out / "export" / "viewer.html", WIDTH, HEIGHT) as shown:
+        (IMAGES / "export-viewer.png").write_bytes(shown.picture())
     light = read_ktx2((out / "export" / "lightmap.ktx2").read_bytes()) @ LUMINANCE
     step = light.shape[0] // 64
     sampled = light[step // 2 :: step, step // 2 :: step]

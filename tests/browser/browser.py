@@ -10,6 +10,9 @@ import subprocess
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from queue import Empty, Queue
@@ -114,21 +117,41 @@ def drawn(export: Path, program: Path, width: int, height: int, **asked: str) ->
     return np.frombuffer(data, "<f4").reshape(height, width, 4)
 
 
-def screenshot(page: Path, target: Path, width: int = 1000, height: int = 700) -> None:
-    """Take a picture of a viewer that is opened from the disk, once it has loaded its scene."""
-    with tempfile.TemporaryDirectory() as profile, _Remote(profile, width, height) as browser:
-        session = browser.opened(page.resolve().as_uri())
+@contextmanager
+def viewer(page: Path, width: int = 1000, height: int = 700) -> Iterator[Viewer]:
+    """Open a viewer from the disk, and yield it once it has loaded its scene."""
+    with tempfile.TemporaryDirectory() as profile, Remote(profile, width, height) as browser:
+        shown = Viewer(browser, browser.opened(page.resolve().as_uri()))
         until = time.monotonic() + WAIT
-        while browser.evaluated(session, "typeof viewer") != "object":
-            message = browser.evaluated(session, "document.getElementById('message').textContent")
+        while shown.evaluated("typeof viewer") != "object":
+            message = shown.evaluated("document.getElementById('message').textContent")
             assert time.monotonic() < until, f"the viewer says: {message}"
             assert "cannot" not in message, message
             time.sleep(0.2)
-        picture = browser.call("Page.captureScreenshot", session=session)["data"]
-        target.write_bytes(base64.b64decode(picture))
+        yield shown
 
 
-class _Remote:
+@dataclass(frozen=True, eq=False)
+class Viewer:
+    """A viewer that shows a scene."""
+
+    browser: Remote
+    session: str
+
+    def evaluated(self, expression: str) -> Any:
+        """Evaluate an expression in the page."""
+        return self.browser.evaluated(self.session, expression)
+
+    def point_at(self, x: int, y: int) -> None:
+        """Move the pointer."""
+        self.browser.call("Input.dispatchMouseEvent", self.session, type="mouseMoved", x=x, y=y)
+
+    def picture(self) -> bytes:
+        """Return a PNG of it."""
+        return base64.b64decode(self.browser.call("Page.captureScreenshot", session=self.session)["data"])
+
+
+class Remote:
     """A Chromium that is driven by its DevTools protocol, over pipes."""
 
     def __init__(self, profile: str, width: int, height: int) -> None:
@@ -149,7 +172,7 @@ class _Remote:
         self._answers = os.fdopen(self._read, "rb")
         self._number = 0
 
-    def __enter__(self) -> _Remote:
+    def __enter__(self) -> Remote:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -19,7 +19,7 @@ import pytest
 import radiosity_addon
 from build_tools import viewer_bundle
 from radiosity_addon.blender.command_line.main import main
-from tests.browser.browser import ROOT, bundled, chromium, drawn, screenshot
+from tests.browser.browser import ROOT, bundled, chromium, drawn, viewer
 from tests.browser.reference import inner_pixels, rendered
 from tests.browser.textured_room import build
 
@@ -132,7 +132,8 @@ def test_the_validator_finds_no_error(exported: Exported) -> None:
 
 def test_the_viewer_opens_from_the_disk(exported: Exported, tmp_path: Path) -> None:
     picture = tmp_path / "viewer.png"
-    screenshot(exported.folder / "viewer.html", picture)
+    with viewer(exported.folder / "viewer.html") as shown:
+        picture.write_bytes(shown.picture())
     image = bpy.data.images.load(str(picture))
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
@@ -141,6 +142,24 @@ def test_the_viewer_opens_from_the_disk(exported: Exported, tmp_path: Path) -> N
     background = np.array([0x20, 0x22, 0x24]) / 255
     lit = (np.abs(colors - background).max(axis=1) > 0.02) & (colors.max(axis=1) > 0.1)
     assert lit.mean() > 0.4, "the scene fills most of the window"
+
+
+def test_the_viewer_mixes_light_groups_and_measures_light(tmp_path: Path) -> None:
+    chromium()
+    radiosity_addon.register()
+    words = ["bake", "--output", str(tmp_path), "--resolution", "32", "--light-group", "Day=Lamp", *DRAFT[2:]]
+    assert main(words) == 0
+    radiosity_addon.unregister()
+    with viewer(tmp_path / "export" / "viewer.html", 500, 500) as shown:
+        before = shown.evaluated("viewer.shiny.irradiance(0, 0.5, 0.5)")
+        shown.evaluated("viewer.shiny.mix({ Day: [2, 2, 3] }); viewer.draw()")
+        after = shown.evaluated("viewer.shiny.irradiance(0, 0.5, 0.5)")
+        np.testing.assert_allclose(after, np.array(before) * (2, 2, 3), rtol=0.01)
+        assert min(before) > 0
+        shown.point_at(250, 200)
+        text = shown.evaluated("document.getElementById('lux').textContent")
+        assert "lx" in text
+        assert "Wall" in text
 
 
 def test_the_bundled_program_is_of_its_sources(tmp_path: Path) -> None:
