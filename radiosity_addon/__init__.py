@@ -43,6 +43,13 @@ def glTF2ExportUserExtension() -> Any:  # noqa: N802 - the exporter's name
     return LightmapExtension()
 
 
+def glTF2ImportUserExtension() -> Any:  # noqa: N802 - the importer's name
+    """Return the hooks for Blender's glTF importer."""
+    from .blender.files.imported_lightmaps import LightmapImport
+
+    return LightmapImport()
+
+
 def unregister() -> None:
     """Take out of Blender all that `register` added."""
     from .blender import registration

@@ -14,10 +14,11 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.exporting import gltf_hook
 from radiosity_addon.blender.exporting.export_scene import arrange_layers, export_scene
+from radiosity_addon.blender.files.files import open_scene
 from radiosity_addon.blender.operators.export_operators import export_folder, is_export_outdated
 from radiosity_addon.exports import Glb
 
-from .hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material
+from .hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
 
 
 @pytest.fixture
@@ -118,6 +119,21 @@ def test_objects_come_back_after_an_export_that_failed(baked: Path) -> None:
     assert contents() != before
     gltf_hook.put_back()
     assert contents() == before
+
+
+def test_an_exported_scene_shows_its_lightmap_when_it_is_imported(baked: Path, enabled: None) -> None:
+    bpy.ops.radiosity.export()
+    path = export_folder(bpy.context) / "scene.glb"
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=str(path))
+    np.testing.assert_allclose(seen_from_above(baked)[0, 0], np.multiply(BASE, TEXEL), rtol=2e-3)
+
+
+def test_an_exported_scene_is_opened_as_it_is_to_be_baked(baked: Path, enabled: None) -> None:
+    bpy.ops.radiosity.export()
+    open_scene(export_folder(bpy.context) / "scene.glb")
+    nodes = [node.type for material in bpy.data.materials for node in material.node_tree.nodes]
+    assert "EMISSION" not in nodes
 
 
 def test_a_scene_without_lightmaps_is_exported_as_ever(
