@@ -129,6 +129,11 @@ class _Lightmaps:
         notes = []
         if shown.light == "indirect":
             notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
+        uneven = [
+            f"{page.shape[1]} × {page.shape[0]}" for page in pages if page.shape[0] % 4 or page.shape[1] % 4
+        ]
+        if uneven:
+            notes.append(f"a page of {uneven[0]} texels cannot be compressed: choose a multiple of 4")
         if shown.padding is not None and shown.padding < ENGINE_PADDING:
             notes.append(
                 f"charts are {shown.padding} texels apart, enough for bilinear filters: for bicubic ones and "
