@@ -44,5 +44,7 @@ def forms_of(text: str) -> Form:
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     unknown = [name for name in names if name not in known]
     if unknown or not names:
-        raise UsageError(f"forms to export '{text}': give one or more of {','.join(known)}, separated by commas")
+        raise UsageError(
+            f"forms to export '{text}': give one or more of {','.join(known)}, separated by commas"
+        )
     return Form(names)

@@ -15,7 +15,9 @@ from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import remove_datablocks
 from ..material_copies.surface_nodes import feed_color
 from ..materials.shader_nodes import output_node
+from .bake_units import alone
 from .export_materials import ALPHA, BASE, EMISSION, ExportMaterial
+from .export_scene import ExportScene
 
 MAX_SIDE = 4096
 """Of images: larger ones have as many texels as the lightmap."""
@@ -28,15 +30,14 @@ def side_factor(side: int) -> int:
 
 def evaluate_channel(
     context: bpy.types.Context,
-    scene: bpy.types.Scene,
+    made: ExportScene,
     objects: Sequence[bpy.types.Object],
-    materials: Sequence[ExportMaterial],
     sizes: Sequence[tuple[int, int]],
     channel: str,
 ) -> list[Array]:
     """Return one channel of all materials on each page, (height, width, 3) float32.
 
-    scene: The temporary one, in which the objects are.
+    objects: Those that stand for all baked ones, see `bake_units`.
     sizes: Width and height of each page's image.
     Raises BakeError if Cycles did not bake.
     """
@@ -44,28 +45,14 @@ def evaluate_channel(
         bpy.data.images.new("Radiosity Export", *size, alpha=True, float_buffer=True, is_data=True)
         for size in sizes
     ]
-    wired = [_Emitting(material, channel, images[material.page]) for material in materials]
+    for image in images:
+        image.pixels.foreach_set(np.zeros(len(image.pixels), dtype=np.float32))
+    wired = [_Emitting(material, channel, images[material.page]) for material in made.materials]
     try:
-        _as_cycles(scene)
-        with context.temp_override(
-            scene=scene,
-            view_layer=scene.view_layers[0],
-            object=objects[0],
-            active_object=objects[0],
-            selected_objects=list(objects),
-            selected_editable_objects=list(objects),
-        ):
-            done = bpy.ops.object.bake(
-                type="EMIT",
-                margin=0,  # that of an object would cover others next to it
-                use_clear=True,
-                target="IMAGE_TEXTURES",
-                save_mode="INTERNAL",
-                use_selected_to_active=False,
-                uv_layer=LIGHTMAP_UV_LAYER,
-            )
-        if done != {"FINISHED"}:
-            raise BakeError("Cycles could not evaluate the materials for the export")
+        _as_cycles(made.scene)
+        for obj in objects:
+            with alone(made, obj):
+                _bake(context, made.scene, obj)
         return [_pixels(image) for image in images]
     except RuntimeError as error:
         raise BakeError(f"Cycles could not evaluate the materials: {' '.join(str(error).split())}") from error
@@ -73,6 +60,29 @@ def evaluate_channel(
         for each in wired:
             each.undo()
         remove_datablocks(images)
+
+
+def _bake(context: bpy.types.Context, scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    """Let Cycles bake an object's emission into its materials' active images."""
+    with context.temp_override(
+        scene=scene,
+        view_layer=scene.view_layers[0],
+        object=obj,
+        active_object=obj,
+        selected_objects=[obj],
+        selected_editable_objects=[obj],
+    ):
+        done = bpy.ops.object.bake(
+            type="EMIT",
+            margin=0,  # that of an object would cover others next to it
+            use_clear=False,
+            target="IMAGE_TEXTURES",
+            save_mode="INTERNAL",
+            use_selected_to_active=False,
+            uv_layer=LIGHTMAP_UV_LAYER,
+        )
+    if done != {"FINISHED"}:
+        raise BakeError("Cycles could not evaluate the materials for the export")
 
 
 class _Emitting:

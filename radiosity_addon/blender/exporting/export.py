@@ -37,6 +37,7 @@ from ...numerics import Array
 from ...options import EFFICACY, ENGINE_PADDING, Form
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
+from .bake_units import bake_units
 from .evaluated_colors import evaluate_channel, image_of, side_factor
 from .export_materials import ALPHA, BASE, CHANNELS, EMISSION
 from .export_scene import PREFIX, ExportScene, export_scene, lamps_in
@@ -195,11 +196,14 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
         height, width = page.shape[:2]
         factor = side_factor(max(width, height))
         sizes.append((factor * width, factor * height))
-    return {
-        channel: evaluate_channel(context, scene.scene, scene.baked_copies, scene.materials, sizes, channel)
-        for channel in CHANNELS
-        if channel in needed
-    }
+    if not needed:
+        return {}
+    with bake_units(context, scene) as objects:
+        return {
+            channel: evaluate_channel(context, scene, objects, sizes, channel)
+            for channel in CHANNELS
+            if channel in needed
+        }
 
 
 def evaluated_materials(context: bpy.types.Context, scene: ExportScene) -> None:
