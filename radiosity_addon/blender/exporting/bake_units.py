@@ -1,4 +1,4 @@
-"""Objects that Cycles evaluates at once: each of its bakes reads a scene, so that single objects cost most."""
+"""Objects that Cycles evaluates together: each of its bakes reads a scene, so that single ones cost most."""
 
 from __future__ import annotations
 
