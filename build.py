@@ -40,6 +40,7 @@ usage: python3 build.py VERB [arguments]
 
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
   restore SCENE [options]    take a bake out of a .blend again
+  export DIR [options]       export a bake for browsers and engines
   test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
                              --quick: the fast ones that need neither bpy nor a window, in a minute, in an
                              environment without bpy; --full: the slow ones too;
@@ -52,6 +53,7 @@ usage: python3 build.py VERB [arguments]
           [gallery [ROW…]]   and the pictures of docs/gallery.md, minutes of work; --check bakes none
   options                    write docs/options.md from the table of options
   docs                       build docs/ to a static site in out/site
+  viewer                     bundle the web viewer with three.js into the extension (needs Node.js)
   package                    make the extension's zips in dist/, one a platform
   real-blender               install the Blender that the tests with a window use (root on Debian)
 """
@@ -65,6 +67,7 @@ def main(arguments: list[str]) -> int:
     verb, rest = arguments[0], arguments[1:]
     verbs = {
         "bake": bake,
+        "export": export,
         "restore": restore,
         "test": test,
         "fuzz": fuzz,
@@ -74,6 +77,7 @@ def main(arguments: list[str]) -> int:
         "options": options,
         "docs": docs,
         "package": package,
+        "viewer": viewer,
         "real-blender": prepare_real_blender,
     }
     if verb not in verbs:
@@ -93,6 +97,11 @@ def main(arguments: list[str]) -> int:
 def bake(arguments: list[str]) -> int:
     """Bake with the command line of the add-on, which says where everything is."""
     return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "bake", *arguments)
+
+
+def export(arguments: list[str]) -> int:
+    """Export with the command line of the add-on."""
+    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "export", *arguments)
 
 
 def restore(arguments: list[str]) -> int:
@@ -178,6 +187,14 @@ def docs(_: list[str]) -> int:
     if code == 0:
         print(f"the site is in {ROOT / 'out' / 'site'}; open index.html")
     return code
+
+
+def viewer(_: list[str]) -> int:
+    """Bundle the web viewer into the extension."""
+    from build_tools import viewer_bundle
+
+    viewer_bundle.write_viewer(ROOT)
+    return 0
 
 
 def package(_: list[str]) -> int:

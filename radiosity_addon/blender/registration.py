@@ -10,7 +10,14 @@ import bpy
 
 from . import handlers
 from .datablocks import bake_record
-from .operators import bake_operators, cleaning, light_group_operators, relight_operators, setting_operators
+from .operators import (
+    bake_operators,
+    cleaning,
+    export_operators,
+    light_group_operators,
+    relight_operators,
+    setting_operators,
+)
 from .overlays import overlay_properties, overlay_view
 from .panels import (
     bake_panel,
@@ -30,6 +37,7 @@ CLASSES = (
     *preferences.CLASSES,
     *bake_operators.CLASSES,
     *relight_operators.CLASSES,
+    *export_operators.CLASSES,
     *light_group_operators.CLASSES,
     *setting_operators.CLASSES,
     *preset_menu.CLASSES,

@@ -36,6 +36,13 @@ class _BakeCommand:
         "would stop",
         SECTION,
     )
+    export: str | None = option(
+        None,
+        "Also export into DIR/export, in one or more of these forms, separated by commas: web, glb, godot, "
+        "unity, bevy. Charts get 4 free pixels between them unless --padding or --mip-levels is given",
+        SECTION,
+        metavar="FORM,…",
+    )
     no_preview: bool = option(False, "Write no preview.png; that of an earlier bake stays", SECTION)
     report: Path | None = option(None, "Second copy of report.json", SECTION, metavar="FILE")
     plot: Path | None = option(
@@ -43,6 +50,18 @@ class _BakeCommand:
         "Draw the history of residual, elements and links, against seconds and iterations",
         SECTION,
         metavar="FILE.svg",
+    )
+
+
+@dataclass(frozen=True)
+class _ExportCommand:
+    """Options of `export` on the command line."""
+
+    forms: str = option(
+        "web",
+        "What to write, separated by commas: web, glb, godot, unity, bevy",
+        SECTION,
+        metavar="FORM,…",
     )
 
 
@@ -62,5 +81,8 @@ class _EveryCommand:
 BAKE_COMMAND = options_of(_BakeCommand)
 """Options of the command `bake` by their name in the parsed request."""
 
+EXPORT_COMMAND = options_of(_ExportCommand)
+"""Options of the command `export`."""
+
 EVERY_COMMAND = options_of(_EveryCommand)
-"""Options of both commands."""
+"""Options of all commands."""

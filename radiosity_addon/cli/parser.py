@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from ..base import UsageError
 from ..options import METHODS, OPTIONS, SECTIONS, BakeSettings, GroupSetting, Option, plain
-from .command_options import BAKE_COMMAND, EVERY_COMMAND
+from .command_options import BAKE_COMMAND, EVERY_COMMAND, EXPORT_COMMAND
 from .path_checks import checked_folder, checked_name, checked_path
 
 BUNDLED_OUTPUT = Path("out/cornell")
@@ -20,10 +20,11 @@ BUNDLED_OUTPUT = Path("out/cornell")
 
 
 def build_parser(prog: str) -> argparse.ArgumentParser:
-    """Return the parser of both commands; it raises `UsageError` where argparse would exit."""
+    """Return the parser of all commands; it raises `UsageError` where argparse would exit."""
     parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,restore}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,export,restore}")
     _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
+    _add_export(verbs.add_parser("export", help="export a bake for engines", allow_abbrev=False))
     _add_restore(verbs.add_parser("restore", help="take the lightmaps out again", allow_abbrev=False))
     return parser
 
@@ -99,6 +100,12 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         options = [option for option in OPTIONS.values() if option.section == section]
         if options:
             _add_options(parser.add_argument_group(section), options)
+
+
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=checked_folder, metavar="DIR", help="the folder that was baked into")
+    _add_options(parser, (*EXPORT_COMMAND.values(), *EVERY_COMMAND.values()))
+    parser.set_defaults(forms=EXPORT_COMMAND["forms"].default)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:

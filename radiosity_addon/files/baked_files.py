@@ -136,15 +136,18 @@ def digest_steps(path: Path) -> Generator[None, None, str]:
     return found.hexdigest()
 
 
-def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[str, dict[str, Any]]:
+def entries(
+    new: Iterable[str], staging: Path, folder: Path, earlier: Report | None
+) -> dict[str, dict[str, Any]]:
     """Return what a new report is to list: the new files, and those the earlier one lists that are there.
 
+    staging: Where the new ones are now.
     folder: Where they will be.
     earlier: The report to be replaced.
     """
     before = {} if earlier is None else earlier[LISTED]
     kept = {name: listed for name, listed in before.items() if (folder / name).is_file()}
-    return {**kept, **{path.name: entry(path) for path in new}}
+    return {**kept, **{name: entry(staging / name) for name in new}}
 
 
 def is_as_written(path: Path, listed: Mapping[str, Any]) -> bool:

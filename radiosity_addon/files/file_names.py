@@ -21,6 +21,14 @@ SIDECAR_NAME = "lightmap.relight"
 LIGHTMAPS = frozenset({".exr", ".png"})
 """Endings of lightmap files, in lower case."""
 
+EXPORT_FOLDER = "export"
+"""Folder of an export next to the command line's bake."""
+
+EXPORT_ENDINGS = frozenset({".glb", ".ktx2"})
+EXPORT_NAMES = frozenset({"lightmaps.json", "viewer.html", "three-lightmap.js", "LICENSES.txt"})
+ENGINE_FOLDERS = {"godot": (".gd", ".md"), "unity": (".cs", ".md"), "bevy": (".rs", ".md")}
+"""What an export writes besides lightmaps: folders of engines, with the endings of files in them."""
+
 UNTITLED = "untitled"
 """Stands for the name of a .blend that was never saved."""
 
@@ -124,11 +132,20 @@ def sanitized(name: str, longest: int = MAX_PART) -> str:
 
 
 def is_bake_name(name: object) -> bool:
-    """Return whether a bake may write a file of this name: a bare one, with an ending of ours."""
-    if not isinstance(name, str) or not name or name.startswith(".") or _FORBIDDEN.search(name):
+    """Return whether a bake or an export may write a file of this name.
+
+    A bare one, with an ending of ours; only exports have folders of engines.
+    """
+    if not isinstance(name, str):
         return False
-    endings = (*LIGHTMAPS, PurePath(SIDECAR_NAME).suffix)
-    return name == BLEND_NAME or name.endswith(REPORT_NAME) or name.lower().endswith(endings)
+    folder, slash, own = name.rpartition("/")
+    if not own or own.startswith(".") or _FORBIDDEN.search(own):
+        return False
+    if slash:
+        return own.endswith(ENGINE_FOLDERS.get(folder, ()))
+    if own == BLEND_NAME or own in EXPORT_NAMES or own.endswith(REPORT_NAME):
+        return True
+    return own.lower().endswith((*LIGHTMAPS, *EXPORT_ENDINGS, PurePath(SIDECAR_NAME).suffix))
 
 
 def highest_page(names: Collection[str], most: int = 1000) -> int:

@@ -6,15 +6,20 @@ Needs nothing but Python, so that panels and the command line can show it at onc
 from __future__ import annotations
 
 from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
+from .choices import EXPORT_FORMS
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
+from .export_forms import ENGINE_PADDING, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Option, option, options_of, plain
 from .panel_settings import PANEL_OPTIONS, RELIGHT_GROUP
-from .sections import ADVANCED, GROUPS, LAST_BAKE, MAIN, SECTIONS, SOLVER, sections_of
+from .sections import ADVANCED, EXPORT, GROUPS, LAST_BAKE, MAIN, SECTIONS, SOLVER, sections_of
 
 __all__ = [
     "ADVANCED",
     "EFFICACY",
+    "ENGINE_PADDING",
+    "EXPORT",
+    "EXPORT_FORMS",
     "GROUPS",
     "LAST_BAKE",
     "MAIN",
@@ -30,8 +35,10 @@ __all__ = [
     "SYMMETRIC_ONLY",
     "UNBOUNDED",
     "BakeSettings",
+    "Form",
     "GroupSetting",
     "Option",
+    "forms_of",
     "option",
     "options_of",
     "options_of_method",

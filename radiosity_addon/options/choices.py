@@ -68,4 +68,16 @@ ASSEMBLIES = (
     Choice("linear", "Linear", "Values at vertices, linear between them"),
 )
 
+EXPORT_FORMS = (
+    Choice(
+        "web",
+        "Web",
+        "scene.glb and its lightmap, a loader for three.js, and viewer.html, which opens as it is",
+    ),
+    Choice("glb", "glTF", "scene.glb and its lightmap, and scene_baked.glb, which any viewer shows lit"),
+    Choice("godot", "Godot", "scene.glb, OpenEXR lightmaps and an importer script for Godot 4"),
+    Choice("unity", "Unity", "scene.glb, OpenEXR lightmaps and scripts for Unity"),
+    Choice("bevy", "Bevy", "scene.glb, lightmaps and a module for Bevy"),
+)
+
 METHOD_CHOICES = tuple(Choice(name, method.label, method.description) for name, method in METHODS.items())

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from .choices import SCOPES, SIZE_MODES
+from .choices import EXPORT_FORMS, SCOPES, SIZE_MODES
 from .option_record import PanelRow, option, options_of
-from .sections import FILES, LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
+from .sections import EXPORT, FILES, LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
 
 RELIGHT_GROUP = "radiosity_relight"
 """The group of properties that files have the options of relighting in."""
+
+
+def _form(name: str, default: bool = False) -> Any:
+    """Return the check box of a form of an export."""
+    choice = next(choice for choice in EXPORT_FORMS if choice.value == name)
+    return option(default, choice.description, EXPORT, panel=PanelRow(choice.label))
 
 
 @dataclass(init=False, repr=False, eq=False)
@@ -79,6 +86,11 @@ class _PanelSettings:
         LAST_BAKE,
         panel=PanelRow("Lightmap Only"),
     )
+    export_web: bool = _form("web", True)
+    export_glb: bool = _form("glb")
+    export_godot: bool = _form("godot")
+    export_unity: bool = _form("unity")
+    export_bevy: bool = _form("bevy")
 
 
 PANEL_OPTIONS = options_of(_PanelSettings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 MAIN, ADVANCED, GROUPS, SOLVER = "Radiosity Lightmaps", "Advanced", "Light Groups", "Solver"
 LAST_BAKE = "Last Bake"
+EXPORT = "Export"
 """Parts of the panel."""
 
 OBJECTS, FILES, RELIGHTING, VIEWPORT = "Objects", "Files", "Relighting", "Viewport"
@@ -24,6 +25,7 @@ SECTIONS = {
     "Light Groups": GROUPS,
     "Solver": SOLVER,
     LAST_BAKE: LAST_BAKE,
+    EXPORT: EXPORT,
 }
 """Every section of the tables, in order, with the part of the panel that shows it."""
 

@@ -54,8 +54,10 @@ class Staging(MarkedFolder):
         return _asides(self.target, self.path)[0]
 
     def names(self) -> list[str]:
-        """Return the names of the files to be published."""
-        return sorted(path.name for path in self.path.iterdir() if path.is_file() and path.name[0] != ".")
+        """Return the names of the files to be published; those of a folder in it begin with the folder's."""
+        found = [path for path in self.path.iterdir() if path.name[0] != "." and path.name != EARLIER]
+        inner = [path for folder in found if folder.is_dir() for path in folder.iterdir()]
+        return sorted(path.relative_to(self.path).as_posix() for path in (*found, *inner) if path.is_file())
 
     def publish(
         self,
@@ -86,6 +88,8 @@ class Staging(MarkedFolder):
         try:
             for name in names:
                 _sync(self.path / name)
+                _make_folder(self.target, name)
+                _make_folder(earlier, name)
                 found[name] = _regular(self.target / name)
                 old = None if found[name] is None else _kept(self.target / name, earlier / name)
                 check(name, old)
@@ -96,7 +100,8 @@ class Staging(MarkedFolder):
                 if not _is_same(found[name], _regular(self.target / name)):
                     raise BakeError(f"'{self.target / name}' was changed while it was being replaced")
                 rename(self.path / name, self.target / name)
-            _sync_folder(self.target)
+            for folder in {(self.target / name).parent for name in names}:
+                _sync_folder(folder)
             (self.path / JOURNAL).unlink()
         except BaseException as error:
             if isinstance(error, OSError) and name is not None:
@@ -222,6 +227,9 @@ def _to_take_back(staging: Path, target: Path, files: Mapping[str, _FileDigests]
     steps: list[_Step] = []
     for name, file in files.items():
         place, kept = target / name, staging / EARLIER / name
+        for folder in (place.parent, kept.parent):
+            if folder.is_symlink():  # what is in it is somewhere else
+                raise ValueError(name)
         present = _digest_of(place)
         if present == file.old:
             continue
@@ -303,6 +311,23 @@ def _kept(path: Path, kept: Path) -> str:
 def rename(source: Path, target: Path) -> None:
     """Rename a file over another; every renaming of ours is this one."""
     source.replace(target)
+
+
+def _make_folder(base: Path, name: str) -> None:
+    """Make the folder that a file's name begins with.
+
+    Raises
+    ------
+    OSError
+        If something else is there, such as a link.
+    """
+    folder = (base / name).parent
+    if folder == base:
+        return
+    with suppress(FileExistsError):
+        folder.mkdir()
+    if not stat.S_ISDIR(folder.lstat().st_mode):
+        raise NotADirectoryError(20, "its folder is a link or a file", str(folder))
 
 
 def _regular(path: Path) -> os.stat_result | None:

@@ -23,7 +23,7 @@ from radiosity_addon.files.baked_files import (
 
 def written(folder: Path, owner: Owner, name: str = "report.json", *files: str) -> Path:
     """A report with its seal."""
-    listed = entries([folder / file for file in files], folder, None)
+    listed = entries(files, folder, folder, None)
     report = {"version": 2, "baked": owner.recorded(folder), "files": listed, "seconds": {"solve": 0.1}}
     (folder / name).write_text(text_of(sealed(report)), encoding="utf-8")
     return folder / name
@@ -32,9 +32,9 @@ def written(folder: Path, owner: Owner, name: str = "report.json", *files: str) 
 def test_new_files_join_those_of_earlier_bakes_that_are_still_there(tmp_path: Path) -> None:
     for name in ("old.exr", "gone.exr", "new.exr"):
         (tmp_path / name).write_text(name)
-    earlier = {"files": entries([tmp_path / "old.exr", tmp_path / "gone.exr"], tmp_path, None)}
+    earlier = {"files": entries(["old.exr", "gone.exr"], tmp_path, tmp_path, None)}
     (tmp_path / "gone.exr").unlink()
-    told = entries([tmp_path / "new.exr"], tmp_path, earlier)
+    told = entries(["new.exr"], tmp_path, tmp_path, earlier)
     assert sorted(told) == ["new.exr", "old.exr"]
     assert told["new.exr"]["bytes"] == len("new.exr")
 
@@ -42,7 +42,7 @@ def test_new_files_join_those_of_earlier_bakes_that_are_still_there(tmp_path: Pa
 def test_a_changed_file_is_not_as_written(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
     path.write_text("light")
-    told = entries([path], tmp_path, None)["a.exr"]
+    told = entries(["a.exr"], tmp_path, tmp_path, None)["a.exr"]
     assert is_as_written(path, told)
     (tmp_path / "link.exr").symlink_to(path)
     assert not is_as_written(tmp_path / "link.exr", told)

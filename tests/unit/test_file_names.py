@@ -108,3 +108,20 @@ def test_names_of_other_kinds_are_no_bakes(name: object) -> None:
 def test_pages_are_counted_as_high_as_files_go() -> None:
     assert highest_page([]) == 1
     assert highest_page(["lightmap.exr", "lightmap_7.exr", "photo_20240101.exr", "notes_9.txt"]) == 7
+
+
+def test_exports_have_names_of_their_own_and_folders_of_engines() -> None:
+    for name in (
+        "scene.glb",
+        "lightmap_2.ktx2",
+        "lightmaps.json",
+        "viewer.html",
+        "godot/radiosity_lightmaps.gd",
+    ):
+        assert is_bake_name(name)
+    for name in (
+        "/scene.glb", "index.html", "package.json", "godot/scene.glb", "godot/../a.gd", "../godot/a.gd",
+        "godot/.gd",
+        "other/a.gd", "godot//a.gd", "/godot/a.gd", "godot/", "a.gd", "godot/a\\b.gd", "C:/a.gd",
+    ):  # fmt: skip
+        assert not is_bake_name(name)

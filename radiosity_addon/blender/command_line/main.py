@@ -10,6 +10,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
+from dataclasses import replace
 from pathlib import Path
 
 from ...base import RadiosityError
@@ -24,7 +25,7 @@ from ...cli import (
     printable,
     requested_settings,
 )
-from ...options import BakeSettings
+from ...options import ENGINE_PADDING, BakeSettings, Form, forms_of
 
 EXIT_DONE = 0
 EXIT_FAILED = 1
@@ -56,16 +57,24 @@ def main(
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
             check_keeping(request, settings)
+        wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
+        form = None if wanted is None else forms_of(wanted)
+        if settings is not None and form is not None and settings.padding is None and not settings.mip_levels:
+            settings = replace(settings, padding=ENGINE_PADDING)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
         return int(help_was_asked.code or 0)
     with Interrupts() if interrupts is None else nullcontext(interrupts) as those:
-        return _run(request, settings, loaded, those)
+        return _run(request, settings, form, loaded, those)
 
 
 def _run(
-    request: argparse.Namespace, settings: BakeSettings | None, loaded: Path | None, interrupts: Interrupts
+    request: argparse.Namespace,
+    settings: BakeSettings | None,
+    form: Form | None,
+    loaded: Path | None,
+    interrupts: Interrupts,
 ) -> int:
     """Run the verb and turn however it ends into an exit code."""
     try:
@@ -109,8 +118,19 @@ def _run(
                     interrupts,
                     preview=not request.no_preview,
                 )
-            else:
+            elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
+            if form is None and settings is not None:
+                from .outdated_exports import warn_of_outdated
+
+                warn_of_outdated(request.output, console)
+            if form is not None:
+                from .export_verb import export
+
+                interrupts.deferred = False
+                export(
+                    request.folder if settings is None else request.output, form, allowed, console, interrupts
+                )
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, EXIT_INTERRUPTED)
     except RadiosityError as error:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
 
 from ...bake import KeepOptions
-from ...bake.result import BakeReport, write_history
-from ...base import BakeWarning, SceneError, UsageError
+from ...bake.result import write_history
+from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
 from ...options import BakeSettings
@@ -21,13 +22,15 @@ from ..files.output import OutputFolder
 from ..files.ownership import CORNELL_BOX, owner_of
 from ..files.saved_files import save_restored
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_record
-from ..jobs.finish import WRITING_STAGES, BakeJob
+from ..jobs.finish import WRITING_STAGES
 from ..jobs.inspection import ERROR, inspect
 from ..jobs.job import run_bake
 from ..operators.checks import figures
 from ..registration import register, unregister
 from ..relight import kept_bakes
 from ..session import last_bake
+
+T = TypeVar("T")
 
 MAX_IMAGES = 8
 """The closing lines name at most this many lightmaps one by one."""
@@ -99,14 +102,14 @@ def bake(
         console.lines(summary(str(output), files, report.as_dict()))
 
 
-def run_through(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeReport:
+def run_through(job: Generator[Status, None, T], console: Console, interrupts: Interrupts) -> T:
     """Run a job to its end and return its report; interrupts end it, but not while it writes files."""
     try:
         while True:
             try:
                 status = next(job)
             except StopIteration as done:
-                report: BakeReport = done.value
+                report: T = done.value
                 return report
             interrupts.check()
             interrupts.deferred = status.stage in WRITING_STAGES

@@ -8,6 +8,12 @@ SCALE_PROPERTY = "radiosity_lightmap_scale"
 QUANTITY_PROPERTY = "radiosity_lightmap_quantity"
 """The quantity that it holds."""
 
+LIGHT_PROPERTY = "radiosity_lightmap_light"
+"""Which light it holds: `all`, `direct` or `indirect`; bakes of earlier versions do not say."""
+
+PADDING_PROPERTY = "radiosity_lightmap_padding"
+"""Free texels between its charts; bakes of earlier versions do not say."""
+
 PAGE, GROUP = "radiosity_page", "radiosity_group_shown"
 """Its page's number, and the light group it shows, "" for all light."""
 

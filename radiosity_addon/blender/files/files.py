@@ -11,6 +11,7 @@ import bpy
 from ...base import BakeWarning, SceneError
 from ..datablocks.quiet_output import silenced
 from .gltf_check import gltf_fault
+from .imported_lightmaps import as_they_are
 from .scene_parts import scene_parts
 
 
@@ -96,10 +97,11 @@ def _import_gltf(path: Path) -> None:
     if addon_utils.check("io_scene_gltf2")[1] is False:
         addon_utils.enable("io_scene_gltf2", default_set=False)
     empty_scene()
-    _import(
-        path,
-        lambda: bpy.ops.import_scene.gltf(filepath=str(path), export_import_convert_lighting_mode="SPEC"),
-    )
+    with as_they_are():
+        _import(
+            path,
+            lambda: bpy.ops.import_scene.gltf(filepath=str(path), export_import_convert_lighting_mode="SPEC"),
+        )
 
 
 def _import_obj(path: Path) -> None:

@@ -66,15 +66,6 @@ def _kept_by(contents: Mapping[str, Any]) -> str:
     return str(kept.get(BAKE, "")) if isinstance(kept, dict) else ""
 
 
-def images_described(contents: Mapping[str, Any]) -> set[str]:
-    """Return the names of the images that a report describes."""
-    try:
-        groups = [page["image"] for group in contents.get("light_groups", ()) for page in group["pages"]]
-        return {*(entry["image"] for entry in contents["objects"]), *groups}
-    except (KeyError, TypeError):
-        return set()
-
-
 def forget_reports() -> None:
     """Read all of them again when they are needed."""
     _known.clear()

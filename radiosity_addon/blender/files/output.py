@@ -183,6 +183,8 @@ class OutputFolder:
         for name in names:
             path = self.path / name
             self._refuse_others(name)
+            if path.parent != self.path and os.path.lexists(path.parent) and not _is_folder(path.parent):
+                self._refuse(path.parent, "is no folder")
             if os.path.lexists(path):
                 entry = self._listed.get(name)
                 ours = entry is not None and (yield from is_as_written_steps(path, entry))
@@ -190,9 +192,9 @@ class OutputFolder:
 
     def files(self) -> dict[str, dict[str, Any]]:
         """Return what the report is to list of the files here: those staged, and those of earlier bakes."""
-        staged = [self.staging / name for name in self._open.names() if name != self.names.report]
-        found = entries(staged, self.path, self.earlier)
-        self._digests = {path.name: found[path.name]["sha256"] for path in staged}
+        staged = [name for name in self._open.names() if name != self.names.report]
+        found = entries(staged, self.staging, self.path, self.earlier)
+        self._digests = {name: found[name]["sha256"] for name in staged}
         return found
 
     def write_report(self, report: BakeReport) -> BakeReport:
@@ -297,6 +299,10 @@ class OutputFolder:
                 folder.rmdir()
             except OSError:
                 return
+
+
+def _is_folder(path: Path) -> bool:
+    return stat.S_ISDIR(path.lstat().st_mode)
 
 
 def refuse_special(path: Path) -> None:

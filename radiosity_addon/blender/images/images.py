@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...bake.layout import padding
 from ...bake.relight import are_wanted
 from ...bake.result import BakeResult, LightmapFile
 from ...base import BakeError
@@ -22,7 +23,14 @@ from ...numerics import tiles
 from ...options import OTHERS, BakeSettings
 from ...scene import BakeScene
 from ..datablocks.bake_record import mark_made, remove_datablocks
-from ..datablocks.image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
+from ..datablocks.image_marks import (
+    GROUP,
+    LIGHT_PROPERTY,
+    PADDING_PROPERTY,
+    PAGE,
+    QUANTITY_PROPERTY,
+    SCALE_PROPERTY,
+)
 from ..datablocks.png import check_whole
 from ..datablocks.quiet_output import silenced
 
@@ -156,7 +164,8 @@ def write_images(
         for number, (page, file_name) in enumerate(zip(pages, file_names, strict=True)):
             images.append(_new_image(page, settings.format, file_name, scale))
             images[-1][PAGE], images[-1][GROUP] = number, group
-            images[-1][QUANTITY_PROPERTY] = settings.quantity
+            images[-1][QUANTITY_PROPERTY], images[-1][LIGHT_PROPERTY] = settings.quantity, settings.light
+            images[-1][PADDING_PROPERTY] = padding(settings)
             _store(images[-1], folder, file_name)
     except BaseException:
         remove_datablocks(images)

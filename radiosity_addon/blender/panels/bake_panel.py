@@ -6,8 +6,9 @@ from typing import Any
 
 import bpy
 
-from ...options import ADVANCED, LAST_BAKE, MAIN, SOLVER
+from ...options import ADVANCED, EXPORT, LAST_BAKE, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
+from ..operators.export_operators import is_export_outdated
 from ..operators.panel_facts import can_restore, has_meshes
 from ..relight import kept_bakes
 from ..scene_records.object_roles import has_role
@@ -229,14 +230,19 @@ class WarningsSection(Section):
 
 
 class ExportSection(Section):
-    """The files of bakes."""
+    """Exports, and the files of bakes."""
 
     name = "radiosity_export"
     label = "Export"
 
     @classmethod
-    def draw(cls, layout: Any, _context: bpy.types.Context) -> None:
-        """Draw what can be done with the files."""
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
+        """Draw what can be done with the lightmaps and their files."""
+        draw_options(layout, EXPORT, context)
+        layout.operator("radiosity.export", icon="EXPORT")
+        if is_export_outdated(context):
+            draw_text(layout.box(), "The export is older than the lightmaps", "INFO", context)
+        layout.operator("radiosity.prepare_export", icon="COLLECTION_NEW")
         layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
         layout.operator("radiosity.clean", icon="BRUSH_DATA")
 

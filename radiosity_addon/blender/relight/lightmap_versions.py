@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import bpy
 
 from ...base import BakeError, RadiosityError
-from ...files import KEPT, LISTED, REPORT_NAME, digest_of_file
+from ...files import KEPT, LISTED, REPORT_NAME, digest_of_file, images_described
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import PAGE, REPORT, VERSION
-from ..files.lightmap_reports import forget_reports, images_described, listed_in, report_of
+from ..files.lightmap_reports import forget_reports, listed_in, report_of
 from ..files.ownership import own_reports
 from ..session.redraw import redraw_sidebars, redraw_viewports
 from ..session.state import session

@@ -5,6 +5,7 @@ No rays, no solver.
 
 from __future__ import annotations
 
+from .dilate import fill as fill_uncovered
 from .encode import encode_png16, png16_scale, presentable, to_quantity
 from .irradiance_statistics import LightStatistics, light_statistics, lit_texels
 from .page import LightmapPage
@@ -18,6 +19,7 @@ __all__ = [
     "Seams",
     "SurfaceTiles",
     "encode_png16",
+    "fill_uncovered",
     "find_seams",
     "lay_out_again",
     "lay_out_surfaces",

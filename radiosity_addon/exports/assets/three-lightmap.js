@@ -1,0 +1,152 @@
+/* Loads scene.glb with its lightmaps into three.js (r152 or later). MIT license, as three.js.
+
+   import { loadLit } from './three-lightmap.js';
+   const lit = await loadLit('scene.glb');   // lightmaps.json and the lightmaps lie next to it
+   scene.add(lit.scene);
+
+   matte: true shows base color × lightmap alone, without highlights, reflections or other lamps' shine.
+   lit.mix({ Kitchen: [1, 0.9, 0.8] }) mixes light groups by color times strength. */
+
+import {
+  DataTexture, FloatType, LinearFilter, MeshLambertMaterial, NoColorSpace, RGBAFormat, RGBFormat,
+  UnsignedInt5999Type,
+} from 'three';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { ZSTDDecoder } from 'three/addons/libs/zstddec.module.js';
+
+const E5B9G9R9 = 123;
+let zstd = null;
+
+/** Load a scene. `read(name)` returns a file as an ArrayBuffer; without it files are fetched next to `url`. */
+export async function loadLit(url, { matte = false, read = null, loader = new GLTFLoader() } = {}) {
+  const folder = url.slice(0, url.lastIndexOf('/') + 1);
+  read ??= async (name) => {
+    const answer = await fetch(folder + name);
+    if (!answer.ok) throw new Error(`${folder + name}: ${answer.status}`);
+    return answer.arrayBuffer();
+  };
+  const gltf = await loader.parseAsync(await read(url.slice(folder.length)), folder);
+  const index = JSON.parse(new TextDecoder().decode(await read('lightmaps.json')));
+  const open = async (page) => readKtx2(await read(page.ktx2));
+  const pages = await Promise.all(index.pages.map(open));
+  const groups = await Promise.all(index.light_groups.map(async (group) => (
+    { ...group, pages: await Promise.all(group.pages.map(open)) })));
+  return new LitScene(gltf, index, pages, groups, matte);
+}
+
+export class LitScene {
+  constructor(gltf, index, pages, groups, matte) {
+    Object.assign(this, { gltf, scene: gltf.scene, index, pages, groups });
+    this.textures = pages.map(textureOf);
+    this.materials = new Map();
+    this.scene.traverse((mesh) => {
+      if (!mesh.isMesh) return;
+      const list = [mesh.material].flat().map((material) => this.#lit(material, matte));
+      mesh.material = Array.isArray(mesh.material) ? list : list[0];
+    });
+  }
+
+  #lit(material, matte) {
+    const lightmap = material.userData.lightmap;
+    if (!lightmap) return material;
+    if (!this.materials.has(material)) this.materials.set(material, matte ? matteOf(material) : material);
+    const made = this.materials.get(material);
+    made.lightMap = this.textures[lightmap.page];
+    made.lightMapIntensity = Math.PI; // texels hold H/π, and three.js divides by π
+    made.needsUpdate = true;
+    return made;
+  }
+
+  /** Mix light groups: factors by name, color times strength; those that are not named keep theirs. */
+  mix(factors) {
+    for (const group of this.groups) group.factor = factors[group.name] ?? group.factor;
+    this.pages.forEach((page, number) => {
+      const sum = new Float32Array(4 * page.width * page.height).fill(1);
+      for (let texel = 0; texel < sum.length; texel += 4) sum[texel] = sum[texel + 1] = sum[texel + 2] = 0;
+      for (const group of this.groups) {
+        const from = colorsOf(group.pages[number]);
+        for (let texel = 0; texel < sum.length; texel += 4) {
+          for (let c = 0; c < 3; c++) sum[texel + c] += group.factor[c] * from[texel + c];
+        }
+      }
+      page.colors = sum;
+      this.textures[number].dispose();
+      const texture = this.textures[number] = prepared(
+        new DataTexture(sum, page.width, page.height, RGBAFormat, FloatType));
+      for (const made of this.materials.values()) {
+        if (made.userData.lightmap.page === number) made.lightMap = texture;
+      }
+    });
+  }
+
+  /** The irradiance [W/m²] at a lightmap coordinate of a page: texel H/π times π, bilinear. */
+  irradiance(pageNumber, u, v) {
+    const page = this.pages[pageNumber], colors = colorsOf(page);
+    const x = clamp(u * page.width - 0.5, page.width), y = clamp(v * page.height - 0.5, page.height);
+    const [x0, y0] = [Math.floor(x), Math.floor(y)];
+    const found = [0, 0, 0];
+    for (const [px, py, weight] of [
+      [x0, y0, (x0 + 1 - x) * (y0 + 1 - y)], [x0 + 1, y0, (x - x0) * (y0 + 1 - y)],
+      [x0, y0 + 1, (x0 + 1 - x) * (y - y0)], [x0 + 1, y0 + 1, (x - x0) * (y - y0)],
+    ]) {
+      const texel = 4 * (Math.min(py, page.height - 1) * page.width + Math.min(px, page.width - 1));
+      for (let c = 0; c < 3; c++) found[c] += Math.PI * weight * colors[texel + c];
+    }
+    return found;
+  }
+}
+
+function clamp(value, count) {
+  return Math.min(Math.max(value, 0), count - 1);
+}
+
+/** Lambert: base color, cut-outs and emission of a material, nothing that shines. */
+function matteOf(material) {
+  const { name, color, map, alphaMap, alphaTest, transparent, opacity, side, vertexColors } = material;
+  const made = new MeshLambertMaterial({
+    name, map, alphaMap, alphaTest, transparent, opacity, side, vertexColors, color: color?.clone(),
+    emissive: material.emissive?.clone(), emissiveMap: material.emissiveMap,
+    emissiveIntensity: material.emissiveIntensity,
+  });
+  made.userData = material.userData;
+  return made;
+}
+
+/** Read a KTX2 file of RGB9E5: { width, height, packed }, rows from the top. */
+export async function readKtx2(buffer) {
+  const view = new DataView(buffer);
+  const [format, width, height, scheme] = [12, 20, 24, 44].map((place) => view.getUint32(place, true));
+  if (view.getUint32(0, true) !== 0x58544bab || format !== E5B9G9R9) throw new Error('not a KTX2 file of RGB9E5');
+  const [offset, size, full] = [80, 88, 96].map((place) => Number(view.getBigUint64(place, true)));
+  let data = new Uint8Array(buffer, offset, size);
+  if (scheme === 2) {
+    zstd ??= new ZSTDDecoder();
+    await zstd.init();
+    data = zstd.decode(data, full);
+  }
+  return { width, height, packed: new Uint32Array(data.slice().buffer), colors: null };
+}
+
+/** The colors of a page as floats, four a texel; decoded once. */
+export function colorsOf(page) {
+  if (page.colors) return page.colors;
+  const colors = page.colors = new Float32Array(4 * page.packed.length);
+  page.packed.forEach((bits, texel) => {
+    const unit = 2 ** ((bits >>> 27) - 24);
+    colors.set([(bits & 511) * unit, (bits >>> 9 & 511) * unit, (bits >>> 18 & 511) * unit, 1], 4 * texel);
+  });
+  return colors;
+}
+
+function textureOf(page) {
+  return prepared(new DataTexture(page.packed, page.width, page.height, RGBFormat, UnsignedInt5999Type));
+}
+
+function prepared(texture) {
+  texture.channel = 1;
+  texture.colorSpace = NoColorSpace; // three.js takes float images as linear
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.generateMipmaps = false;
+  texture.needsUpdate = true;
+  return texture;
+}

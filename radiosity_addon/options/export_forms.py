@@ -1,0 +1,50 @@
+"""The forms of an export: what the word or words after `--export` mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..base import UsageError
+from .choices import EXPORT_FORMS
+
+ENGINES = ("godot", "unity", "bevy")
+
+ENGINE_PADDING = 4
+"""Free texels between charts that bicubic filters, and compressed blocks of 4 × 4, need."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """What an export writes: which parts of the requested forms."""
+
+    names: tuple[str, ...]
+
+    @property
+    def lit_scene(self) -> bool:
+        """Whether scene_baked.glb is written."""
+        return "glb" in self.names or "web" in self.names
+
+    @property
+    def viewer(self) -> bool:
+        """Whether the viewer and the loader are written."""
+        return "web" in self.names
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The engines among the forms."""
+        return tuple(name for name in ENGINES if name in self.names)
+
+
+def forms_of(text: str) -> Form:
+    """Return the forms of a list such as `web,godot`, without repetition.
+
+    Raises UsageError if one is unknown, or there is none.
+    """
+    known = [choice.value for choice in EXPORT_FORMS]
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    unknown = [name for name in names if name not in known]
+    if unknown or not names:
+        raise UsageError(
+            f"forms to export '{text}': give one or more of {','.join(known)}, separated by commas"
+        )
+    return Form(names)

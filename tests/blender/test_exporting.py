@@ -1,0 +1,187 @@
+"""Exports from the panel, by Blender's own exporter and for others; materials as glTF can have them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender.exporting import gltf_hook
+from radiosity_addon.blender.exporting.export_scene import arrange_layers, export_scene
+from radiosity_addon.blender.files.files import open_scene
+from radiosity_addon.blender.operators.export_operators import export_folder, is_export_outdated
+from radiosity_addon.exports import Glb
+
+from .hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
+
+
+@pytest.fixture
+def baked(registered: None, tmp_path: Path) -> Path:
+    """Two planes that show a lightmap made by hand, in a saved file; the second has a mesh it shares."""
+    material = principled_material()
+    plane = add_plane(material=material)
+    plane.name = "Plane"
+    other = plane.copy()
+    other.name, other.location = "Other", (3, 0, 0)
+    bpy.context.scene.collection.objects.link(other)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    (tmp_path / "lightmaps").mkdir()
+    bake_by_hand(folder=tmp_path / "lightmaps")
+    return tmp_path
+
+
+@pytest.fixture
+def enabled() -> Iterator[None]:
+    """The add-on among those whose hooks Blender's exporter calls."""
+    entry = bpy.context.preferences.addons.new()
+    entry.module = radiosity_addon.__name__
+    yield
+    bpy.context.preferences.addons.remove(entry)
+
+
+def contents() -> dict[str, list[Any]]:
+    """What objects show, and all names in the file."""
+    kinds = ("objects", "meshes", "materials", "images", "scenes", "node_groups", "collections")
+    names = {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
+    shown = [
+        (obj.name, obj.data.name, [(slot.link, slot.material.name) for slot in obj.material_slots])
+        for obj in bpy.data.objects
+    ]
+    return {**names, "shown": shown}
+
+
+def test_the_panel_exports_next_to_the_lightmaps(baked: Path) -> None:
+    before = contents()
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert contents() == before
+    folder = export_folder(bpy.context)
+    assert folder == baked / "lightmaps" / "room_Scene_export"
+    assert {"scene.glb", "scene_baked.glb", "viewer.html", "report.json"} <= {
+        p.name for p in folder.iterdir()
+    }
+    glb = Glb.of_bytes((folder / "scene.glb").read_bytes())
+    (material,) = glb.json["materials"]
+    color = material["pbrMetallicRoughness"]["baseColorFactor"]
+    np.testing.assert_allclose(color, (*BASE, 1.0), atol=1e-6)
+    assert sorted(node["name"] for node in glb.json["nodes"]) == ["Other", "Plane"]
+
+
+def test_an_export_of_other_lightmaps_is_outdated(baked: Path) -> None:
+    assert not is_export_outdated(bpy.context)
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert not is_export_outdated(bpy.context)
+    image = next(each for each in bpy.data.images if each.get("radiosity_page") is not None)
+    image["radiosity_version"] = "another"
+    assert is_export_outdated(bpy.context)
+
+
+def test_nothing_is_exported_without_a_form_or_a_bake(baked: Path) -> None:
+    bpy.context.scene.radiosity.export_web = False
+    with pytest.raises(RuntimeError, match="form"):
+        bpy.ops.radiosity.export()
+    bpy.ops.radiosity.restore()
+    assert not bpy.ops.radiosity.export.poll()
+
+
+def test_blenders_own_exporter_names_lightmaps(baked: Path, enabled: None) -> None:
+    before = contents()
+    path = baked / "own.glb"
+    bpy.ops.export_scene.gltf(filepath=str(path), export_extras=True, export_lights=True)
+    assert contents() == before
+    glb = Glb.of_bytes(path.read_bytes())
+    text = json.dumps(glb.json)
+    assert "radiosity" not in text
+    (material,) = glb.json["materials"]
+    assert material["extras"]["lightmap"]["file"] == "own_lightmap.ktx2"
+    assert (baked / "own_lightmap.ktx2").is_file()
+    assert material["extensions"]["MOZ_lightmap"]["texCoord"] == 1
+    np.testing.assert_allclose(material["pbrMetallicRoughness"]["baseColorFactor"], (*BASE, 1.0), atol=1e-6)
+    for mesh in glb.json["meshes"]:
+        assert "TEXCOORD_1" in mesh["primitives"][0]["attributes"]
+
+
+def test_blenders_own_exporter_replaces_no_file_of_others(baked: Path, enabled: None) -> None:
+    (baked / "own_lightmap.ktx2").write_bytes(b"mine")
+    bpy.ops.export_scene.gltf(filepath=str(baked / "own.glb"))
+    assert (baked / "own_lightmap.ktx2").read_bytes() == b"mine"
+    assert "MOZ_lightmap" not in json.dumps(Glb.of_bytes((baked / "own.glb").read_bytes()).json)
+
+
+def test_objects_come_back_after_an_export_that_failed(baked: Path) -> None:
+    before = contents()
+    gltf_hook.before({"gltf_filepath": str(baked / "own.glb")})
+    assert contents() != before
+    gltf_hook.put_back()
+    assert contents() == before
+
+
+def test_an_exported_scene_shows_its_lightmap_when_it_is_imported(baked: Path, enabled: None) -> None:
+    bpy.ops.radiosity.export()
+    path = export_folder(bpy.context) / "scene.glb"
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=str(path))
+    np.testing.assert_allclose(seen_from_above(baked)[0, 0], np.multiply(BASE, TEXEL), rtol=2e-3)
+
+
+def test_an_exported_scene_is_opened_as_it_is_to_be_baked(baked: Path, enabled: None) -> None:
+    bpy.ops.radiosity.export()
+    open_scene(export_folder(bpy.context) / "scene.glb")
+    nodes = [node.type for material in bpy.data.materials for node in material.node_tree.nodes]
+    assert "EMISSION" not in nodes
+
+
+def test_a_scene_without_lightmaps_is_exported_as_ever(
+    registered: None, enabled: None, tmp_path: Path
+) -> None:
+    add_plane(material=principled_material())
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "plain.glb"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plain.glb"]
+
+
+def test_prepared_objects_have_their_own_materials_and_stay(baked: Path) -> None:
+    assert bpy.ops.radiosity.prepare_export() == {"FINISHED"}
+    assert bpy.ops.radiosity.prepare_export() == {"FINISHED"}
+    collection = bpy.data.collections["Lightmap Export"]
+    assert collection.hide_render
+    assert sorted(obj.name for obj in collection.objects) == ["Other (Export)", "Plane (Export)"]
+    for obj in collection.objects:
+        assert obj.data.uv_layers[1].name == "Lightmap"
+        assert "(Lightmap)" not in obj.data.materials[0].name
+        assert not [key for key in (*obj.keys(), *obj.data.keys()) if key.startswith("radiosity")]
+    bpy.ops.radiosity.restore()
+    assert len(collection.objects) == 2
+
+
+@pytest.mark.parametrize(
+    "names", [["Lightmap"], ["A", "Lightmap"], ["A", "B", "Lightmap"], ["Lightmap", "A"]]
+)
+def test_the_lightmap_is_always_the_second_layer(names: list[str]) -> None:
+    mesh = add_plane().data
+    while mesh.uv_layers:
+        mesh.uv_layers.remove(mesh.uv_layers[0])
+    values = {name: np.random.default_rng(number).random(8, np.float32) for number, name in enumerate(names)}
+    for name in names:
+        mesh.uv_layers.new(name=name).uv.foreach_set("vector", values[name])
+    others = [name for name in names if name != "Lightmap"]
+    assert arrange_layers(mesh, "Plane") == bool(others)
+    found = [layer.name for layer in mesh.uv_layers]
+    assert found == [*(others[:1] or ["UVMap"]), "Lightmap", *others[1:]]
+    for layer in mesh.uv_layers:
+        got = np.empty(8, np.float32)
+        layer.uv.foreach_get("vector", got)
+        np.testing.assert_array_equal(got, values.get(layer.name, values["Lightmap"]))
+    assert mesh.uv_layers[0].active_render
+
+
+def test_the_exported_page_is_the_baked_one(baked: Path) -> None:
+    made = export_scene(bpy.context)
+    try:
+        np.testing.assert_allclose(made.shown.page(0)[..., :], TEXEL * np.ones((4, 8, 3)), rtol=1e-6)
+    finally:
+        made.close()
