@@ -27,7 +27,7 @@ CHUNK_PAIRS = 1 << 18
 MANY = 256
 """More faces than these are evaluated in groups where they are far."""
 
-FEW = 8
+FEW = 32
 """Up to so many faces are evaluated exactly everywhere, …"""
 
 FAR = 10.0
@@ -40,6 +40,9 @@ cache."""
 
 CHUNK_POINTS = 1 << 12
 """Points that go down a tree of faces at once: each of them visits some hundred nodes."""
+
+ROUNDED = 1e-5
+"""Heights of single precision are right to this part of the distance."""
 
 ENDS = 2.0
 """Surface offsets from an emissive face to where shadow rays end. Their starts are lifted by one, which
@@ -245,15 +248,18 @@ class EmitterGroup:
         x, y, z = (self._center[axis] - apart[:, axis, None] for axis in range(3))
         up = normals.astype(np.float32)
         rise = x * up[:, :1] + y * up[:, 1:2] + z * up[:, 2:]
-        if len(self._corners) <= FEW:
-            return np.zeros_like(rise), rise > -2.0 * self._radius
         ahead = -(x * self._facing[0] + y * self._facing[1] + z * self._facing[2])
+        # What may be above the horizon, and in front, for all that rounding and the lift of rays' starts do.
+        slack = np.float32(self._offset + ROUNDED * np.abs(apart).max(initial=0.0))
+        seen = (rise > -(self._radius + slack)) & (ahead > -slack)
+        if len(self._corners) <= FEW:
+            return np.zeros_like(rise), seen
         square = x * x + y * y + z * z
         simple = (square > (FAR * self._radius) ** 2) & (rise > self._radius)
         factor = rise * np.maximum(ahead, 0.0) * self._size
         divisor = square * (np.float32(np.pi) * square + self._size)
         factor = np.divide(factor, divisor, out=np.zeros_like(factor), where=simple)
-        return factor, ~simple & (rise > -2.0 * self._radius)
+        return factor, seen & ~simple
 
     def _from_near(self, points: Array, normals: Array, point: Array, face: Array) -> Array:
         """Return (p,) the factors of pairs in closed form."""
