@@ -30,6 +30,9 @@ this many are evaluated."""
 EDGE_DIFFERENCE = 0.5
 """Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
 
+CORNERS = np.array([[0.001, 0.001], [0.999, 0.001], [0.999, 0.999], [0.001, 0.999]], dtype=np.float32)
+"""Of a footprint, as its samples are placed."""
+
 NEGLIGIBLE = 0.01
 """What is less than this part of the light expected is taken at the center: over a footprint it may vary."""
 
@@ -131,7 +134,10 @@ class SpreadPoints:
             # An edge that only cuts a footprint's corner is found from its neighbors.
             lit = marked(len(gain), lambda rows: gain[rows] > 0)
             counts = marked(len(gain), lambda rows: self.matters(light, gain[rows], rows))
-            rows = row_numbers((at.near(jump) | (at.near(lit) & at.near(~lit))) & at.near(counts))
+            crossed = at.near(jump)
+            doubted = row_numbers(at.near(lit) & at.near(~lit) & at.near(counts) & ~crossed)
+            crossed[doubted] = self.is_cut(light, doubted, lit[doubted])
+            rows = row_numbers(crossed & at.near(counts))
             gain[rows] = self.many(light, rows)
         return gain
 
@@ -147,6 +153,17 @@ class SpreadPoints:
     def width(self, part: slice) -> Array:
         """Return (r,) how far a footprint reaches from its center, twice: about its width [m]."""
         return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
+
+    def is_cut(self, light: Lamp | EmitterGroup, rows: Array, lit: Array) -> Array:
+        """Return (r,) whether not all corners of rows' footprints are lit as their centers are, `lit` (r,)."""
+        cut = np.empty(len(rows), dtype=bool)
+        assert self.at.sampler is not None
+        for start in range(0, len(rows), CHUNK_POINTS):
+            chunk = slice(start, start + CHUNK_POINTS)
+            corners = np.broadcast_to(CORNERS, (len(rows[chunk]), *CORNERS.shape))
+            bright = self.gains(light, rows[chunk], self.at.sampler(rows[chunk], corners)) > 0.0
+            cut[chunk] = (bright != lit[chunk, None]).any(axis=1)
+        return cut
 
     def many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
         """Return (r,) the mean gain at some rows, by many points of each."""
