@@ -24,7 +24,7 @@ QUALITY_SETTINGS = {
         SolverSettings(
             shadow_rays=4,
             error=3e-3,
-            min_area=4e-4,
+            min_area=3e-4,
             form_factor_error=0.02,
             elements=500,
             patches=100,
@@ -36,7 +36,7 @@ QUALITY_SETTINGS = {
         SolverSettings(
             shadow_rays=8,
             error=1e-4,
-            min_area=3e-4,
+            min_area=2e-5,
             form_factor_error=0.01,
             elements=1500,
             patches=200,
@@ -48,7 +48,7 @@ QUALITY_SETTINGS = {
         SolverSettings(
             shadow_rays=16,
             error=3e-5,
-            min_area=2e-4,
+            min_area=1e-5,
             form_factor_error=0.002,
             elements=4000,
             patches=400,
@@ -60,7 +60,7 @@ QUALITY_SETTINGS = {
 
 
 COARSEST = Quality(
-    SolverSettings(shadow_rays=2, error=1e-2, min_area=5e-4),
+    SolverSettings(shadow_rays=2, error=1e-2, min_area=3e-4),
     GatherSettings(strides=(4, 2, 1), support=0.2, rays=32, tolerance=2e-3),
 )
 """The settings for the largest target errors."""

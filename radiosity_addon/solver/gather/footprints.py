@@ -155,7 +155,7 @@ class SpreadPoints:
         return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
 
     def is_cut(self, light: Lamp | EmitterGroup, rows: Array, lit: Array) -> Array:
-        """Return (r,) whether not all corners of rows' footprints are lit as their centers are, `lit` (r,)."""
+        """Return (r,) whether any corner of rows' footprints is lit unlike their centers, `lit` (r,)."""
         cut = np.empty(len(rows), dtype=bool)
         assert self.at.sampler is not None
         for start in range(0, len(rows), CHUNK_POINTS):
