@@ -23,7 +23,7 @@ QUALITY_SETTINGS = {
     "draft": Quality(
         SolverSettings(
             shadow_rays=4,
-            error=3e-3,
+            error=1e-3,
             min_area=3e-4,
             form_factor_error=0.02,
             elements=500,
@@ -60,7 +60,7 @@ QUALITY_SETTINGS = {
 
 
 COARSEST = Quality(
-    SolverSettings(shadow_rays=2, error=1e-2, min_area=3e-4),
+    SolverSettings(shadow_rays=2, error=3e-3, min_area=3e-4),
     GatherSettings(strides=(4, 2, 1), support=0.2, rays=32, tolerance=2e-3),
 )
 """The settings for the largest target errors."""

@@ -364,7 +364,7 @@ def test_links_that_had_to_begin_coarse_are_reported(monkeypatch: pytest.MonkeyP
         return [warning.message for warning in warnings if "links begin coarse" in warning.message]
 
     assert told() == []
-    (message,) = told(max_links=500)
+    (message,) = told(max_links=2_000)
     share = float(message.split("up to ")[1].split("%")[0])
     assert 100 * initial.COARSEST_FAINT * QUALITY_SETTINGS["draft"].solver.error < share < 100
     assert says(message, "Max Links", "memory limit")

@@ -83,12 +83,12 @@ class BakeResult:
         "glass" the names of objects that light goes through, if there are any.
     warnings: The scene's and the bake's own.
     seconds: Wall-clock time of each stage.
-    performance: Processor seconds of each stage and in Embree, and what rays took (`stages.py`).
     atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilisation"
         (the share of texels that show a surface) and the number of "objects".
     groups: Those that were requested, and one of all light that is in none of them.
     light: Parallel to `objects`: statistics of the light on their fronts, see `details.py`.
     coincident: By the names of objects that have some: triangles that are in the place of other faces.
+    performance: Processor seconds of each stage and in Embree, and what rays took (`stages.py`).
     """
 
     pages: tuple[LightmapPage, ...]
@@ -96,9 +96,9 @@ class BakeResult:
     solver: dict[str, Any]
     warnings: tuple[BakeWarning, ...]
     seconds: dict[str, float] = field(default_factory=dict)
-    performance: dict[str, Any] = field(default_factory=dict)
     atlas: tuple[dict[str, float], ...] = ()
     groups: tuple[LightGroup, ...] = ()
     light: tuple[dict[str, Any], ...] = ()
     coincident: dict[str, int] = field(default_factory=dict)
     details: BakeDetails | None = None
+    performance: dict[str, Any] = field(default_factory=dict)
