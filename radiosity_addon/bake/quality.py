@@ -24,7 +24,7 @@ QUALITY_SETTINGS = {
         SolverSettings(
             shadow_rays=4,
             error=1e-3,
-            min_area=3e-4,
+            min_area=1e-4,
             form_factor_error=0.02,
             elements=500,
             patches=100,
