@@ -54,7 +54,7 @@ from .result import (
     object_density,
     solver_part,
 )
-from .stages import timed
+from .stages import StageTimes, timed
 from .texel_memory import refuse_large_pages, share_out_memory, texel_scratch
 from .turned_faces import BackProbe, front_irradiance, turned_away
 
@@ -118,7 +118,7 @@ def _bake(
         raise UsageError("a residual is of all light together: bake another quantity to relight it")
     if are_wanted(bake_scene, settings):
         check_groups(bake_scene, settings)
-    seconds: dict[str, float] = {}
+    seconds = StageTimes()
     quality = quality_of(settings)
     baked = baked_objects(bake_scene)
     if not baked:
@@ -172,7 +172,7 @@ def finish(
     solved: HierarchyReport,
     lit: TexelValues,
     more: More,
-    seconds: dict[str, float],
+    seconds: StageTimes,
     progress: Progress,
 ) -> tuple[BakeResult, KeptBake | None]:
     """Put texel values on pages, and report the bake; data to keep goes into the kept bake."""
@@ -223,6 +223,7 @@ def finish(
         solver=report,
         warnings=warnings,
         seconds=seconds,
+        performance=seconds.performance(len(geometry)),
         atlas=_page_facts(atlas, pages),
         groups=groups,
         light=light,

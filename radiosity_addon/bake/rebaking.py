@@ -20,7 +20,7 @@ from .pipeline import TexelValues, baked_objects, finish
 from .plan import moved_objects
 from .relight import HierarchyReport, KeptBake, held_values
 from .result import BakeResult, statistics
-from .stages import timed
+from .stages import StageTimes, timed
 
 RIGID = 1e-4
 """Edges that differ by no more than this part have kept their length."""
@@ -39,7 +39,7 @@ def bake_moved(
     Returns kept: Of the scene as it is now.
     Raises SceneError if more than places of objects has changed, or nothing has.
     """
-    seconds: dict[str, float] = {}
+    seconds = StageTimes()
     names = moved_objects(kept, bake_scene)
     if not names:
         raise SceneError("nothing has moved since the last bake; there is nothing to update")

@@ -83,5 +83,9 @@ def edge_distances(points: Array, polygon: Array, edge: int) -> Array:
     """Return (t, p) cross products that are ≥ 0 where points (t, p, 2) lie left of an edge of (t, k, 2)."""
     start, end = polygon[:, edge], polygon[:, (edge + 1) % polygon.shape[1]]
     along = end - start
-    apart = points[..., :2] - start[:, None]
-    return np.asarray(along[:, None, 0] * apart[..., 1] - along[:, None, 1] * apart[..., 0])
+    across = points[..., 1] - start[:, 1:]
+    across *= along[:, :1]
+    aside = points[..., 0] - start[:, :1]
+    aside *= along[:, 1:]
+    across -= aside
+    return np.asarray(across)

@@ -38,10 +38,11 @@ def hash_keys(keys: npt.ArrayLike, seed: int = 0) -> npt.NDArray[np.uint32]:
 def _avalanche(bits: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     """Return a bijection of uint32 in which every input bit flips about half the output bits."""
     bits = bits ^ (bits >> np.uint32(16))
-    bits = bits * np.uint32(0x7FEB352D)
-    bits = bits ^ (bits >> np.uint32(15))
-    bits = bits * np.uint32(0x846CA68B)
-    return bits ^ (bits >> np.uint32(16))
+    bits *= np.uint32(0x7FEB352D)
+    bits ^= bits >> np.uint32(15)
+    bits *= np.uint32(0x846CA68B)
+    bits ^= bits >> np.uint32(16)
+    return bits
 
 
 def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0) -> npt.NDArray[np.float32]:
@@ -64,12 +65,16 @@ def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0
     low = index & np.uint32((1 << _TABLE_BITS) - 1)
     high = index - low
     order = _shuffle(_reversals()[low], hash_keys(rows, 3 * seed)[:, None])
-    bits = _reversed_table()[order]
+    # Both dimensions at once, as one number of 64 bits.
+    bits = _reversed_table().view(np.uint64)[:, 0].take(order).view(np.uint32).reshape(*order.shape, 2)
     if high.any():
         bits ^= _sobol_bits(high)
     bits ^= np.stack([hash_keys(rows, 3 * seed + 1), hash_keys(rows, 3 * seed + 2)], axis=-1)[:, None]
     # 24 bits are what a float32 below 1 holds exactly; rounding 32 could give 1.
-    return (bits >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+    bits >>= np.uint32(8)
+    square = bits.astype(np.float32)
+    square *= np.float32(2.0**-24)
+    return square
 
 
 def _shuffle(reversed_index: npt.NDArray[np.uint32], salt: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
@@ -80,8 +85,9 @@ def _shuffle(reversed_index: npt.NDArray[np.uint32], salt: npt.NDArray[np.uint32
     """
     bits = reversed_index + salt
     for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
-        bits = bits ^ (bits * np.uint32(factor))
-    return bits & np.uint32((1 << _TABLE_BITS) - 1)
+        bits ^= bits * np.uint32(factor)
+    bits &= np.uint32((1 << _TABLE_BITS) - 1)
+    return bits
 
 
 def _reversed_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:

@@ -6,7 +6,7 @@ Embree does the work; only `embree.py` imports it.
 from __future__ import annotations
 
 from .caster import NO_HIT, SAGITTA, SIGHT_LIFT, Hits, RayCaster, free_segment, passing_light, surface_offset
-from .embree import TARGET_SLACK, EmbreeCaster
+from .embree import TARGET_SLACK, EmbreeCaster, embree_work
 
 __all__ = [
     "NO_HIT",
@@ -16,6 +16,7 @@ __all__ = [
     "EmbreeCaster",
     "Hits",
     "RayCaster",
+    "embree_work",
     "free_segment",
     "passing_light",
     "surface_offset",

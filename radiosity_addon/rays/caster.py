@@ -116,7 +116,7 @@ def passing_light(
 def free_segment(caster: RayCaster, start: Array, end: Array) -> Array:
     """Return (n,) whether nothing lies between (n, 3) points."""
     along = end - start
-    length = np.linalg.norm(along, axis=1)
+    length = np.sqrt(np.einsum("nk,nk->n", along, along))
     return caster.unoccluded(start, along / np.maximum(length, 1e-300)[:, None], length)
 
 

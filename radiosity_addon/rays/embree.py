@@ -7,6 +7,7 @@ what lies back to back with a black back (`scene/coincident_pairs.py`).
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from threading import Lock
 from typing import Any
@@ -22,6 +23,32 @@ CHUNK = 1 << 16
 
 TARGET_SLACK = 1e-5
 """A segment is tested up to this fraction short of its end, in float32's reach."""
+
+
+class _Work:
+    """What Embree has done in this process: processor seconds and rays."""
+
+    def __init__(self) -> None:
+        self.seconds, self.rays = 0.0, 0
+        self._counting = Lock()
+
+    def run(self, scene: Any, start: Array, along: Array, **query: Any) -> Any:
+        """Trace rays, and count them."""
+        started = time.thread_time()
+        found = scene.run(start, along, **query)
+        taken = time.thread_time() - started
+        with self._counting:
+            self.seconds += taken
+            self.rays += len(start)
+        return found
+
+
+_WORK = _Work()
+
+
+def embree_work() -> tuple[float, int]:
+    """Return processor seconds spent in Embree so far, and how many rays it traced."""
+    return _WORK.seconds, _WORK.rays
 
 
 class EmbreeCaster:
@@ -132,7 +159,7 @@ def _unoccluded(
     along = np.ascontiguousarray(directions[rows], dtype=np.float32)
     # A copy on purpose: Embree overwrites the distances it is given.
     reach = np.minimum(distances[rows] * (1.0 - TARGET_SLACK), 1e30).astype(np.float32)
-    return scene.run(start, along, dists=reach, query="OCCLUDED") != 0
+    return np.asarray(_WORK.run(scene, start, along, dists=reach, query="OCCLUDED") != 0)
 
 
 def _first_hits(
@@ -147,7 +174,7 @@ def _first_hits(
     """Return the columns of `Hits`, barycentric coordinates one by one."""
     start = (origins[rows] - center).astype(np.float32)
     along = np.ascontiguousarray(directions[rows], dtype=np.float32)
-    found = scene.run(start, along, output=True)
+    found = _WORK.run(scene, start, along, output=True)
     row = found["primID"]
     hit = row >= 0
     return (

@@ -177,11 +177,13 @@ def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array
     count = first[row + 1] - first[row]
     point = np.repeat(np.arange(len(row)), count)
     part = run_numbers(count, first[row])
-    polygon, at = parts[part], place[point][:, None]
-    inside = np.ones(len(point), dtype=bool)
-    for edge in range(parts.shape[1]):
-        inside &= edge_distances(at, polygon, edge)[:, 0] >= INSIDE
-    return point[inside], part[inside]
+    corners = parts.shape[1]
+    for edge in range(corners):
+        # Most pairs fail at one of the first edges.
+        side = parts[part[:, None], [[edge, (edge + 1) % corners]]]
+        inside = edge_distances(place[point][:, None], side, 0)[:, 0] >= INSIDE
+        point, part = point[inside], part[inside]
+    return point, part
 
 
 def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple[Array, Covers]:

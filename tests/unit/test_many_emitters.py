@@ -40,6 +40,7 @@ def places(count: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 
 def group(triangles: np.ndarray, many: int, monkeypatch: pytest.MonkeyPatch) -> EmitterGroup:
     monkeypatch.setattr(emitters, "MANY", many)
+    monkeypatch.setattr(emitters, "FEW", many)
     return EmitterGroup(triangles, normals_of(triangles), np.ones(3), 1e-6)
 
 
@@ -110,6 +111,21 @@ def test_what_a_point_gets_does_not_depend_on_who_asks_with_it(monkeypatch: pyte
     monkeypatch.setattr(emitters, "CHUNK_POINTS", 7)
     np.testing.assert_array_equal(lamp.unit_irradiance(points, normals), together)
     np.testing.assert_array_equal(lamp.unit_irradiance(points[::3], normals[::3]), together[::3])
+
+
+@pytest.mark.parametrize("shape", ["panel", "bulb"])
+def test_small_faces_send_like_disks(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles, apart = (panel(8), 0.0) if shape == "panel" else (sphere(2)[:, [0, 2, 1]] * 0.1 + CENTER, 0.1)
+    points, normals = places(1000, apart)
+    exact = group(triangles, 10**9, monkeypatch).factors(points, normals)
+    monkeypatch.setattr(emitters, "FEW", 8)
+    lamp = EmitterGroup(triangles, normals_of(triangles), np.ones(3), 1e-6)
+    found = lamp.factors(points, normals)
+    assert ((found > 0) == (exact > 0)).all()
+    total = exact.sum(axis=1)
+    np.testing.assert_allclose(found.sum(axis=1), total, rtol=0.01, atol=1e-9)
+    np.testing.assert_allclose(found.sum(), exact.sum(), rtol=0.001)
+    np.testing.assert_array_equal(lamp.factors(points[::3], normals[::3]), found[::3])
 
 
 def test_levels_weigh_the_faces(monkeypatch: pytest.MonkeyPatch) -> None:

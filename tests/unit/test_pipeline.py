@@ -200,6 +200,16 @@ def test_threads_change_no_byte_and_the_seed_does() -> None:
     assert one.pages[0].pixels.tobytes() != other.pages[0].pixels.tobytes()
 
 
+def test_the_work_of_the_processor_is_reported() -> None:
+    result = run(lit_room(lights=[LAMP]), threads=1)
+    work = result.performance
+    assert set(work["processor_seconds"]) == set(result.seconds)
+    assert work["rays"] >= result.solver["rays"] > 0
+    assert 0.0 < work["embree_seconds"] < sum(work["processor_seconds"].values())
+    assert work["rays_per_texel"] > 1.0
+    assert work["microseconds_per_ray"] * work["rays"] > 1e6 * work["embree_seconds"] * 0.5
+
+
 def without_seconds(solver: dict[str, Any]) -> dict[str, Any]:
     """What the solver tells, but for how long it took."""
     history = [{**entry, "seconds": None} for entry in solver["history"]]

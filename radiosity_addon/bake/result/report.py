@@ -103,6 +103,7 @@ class BakeReport:
                 "solver": _plain(solver),
                 "warnings": [{"name": w.name, "message": w.message} for w in result.warnings],
                 "seconds": {stage: round(float(taken), 4) for stage, taken in seconds.items()},
+                **({"performance": _plain(result.performance)} if result.performance else {}),
             }
         )
 

@@ -82,7 +82,7 @@ class TexelGeometry:
         self.texels = self._joined(texels)
         self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
         self.triangle, self.whole = scratch.empty(count, np.int32), scratch.empty(count, np.bool_)
-        self._inset = _edge_inset(scene)
+        self._inset, self._depth = _edge_inset(scene), SINK * surface_offset(scene.triangles)
         self.surface_normal = scratch.empty((count, 3))
         self.barycentric = scratch.empty((count, 2), np.float32)
         self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
@@ -203,13 +203,13 @@ class TexelGeometry:
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
-        triangle = np.broadcast_to(self.triangle[rows][:, None], points.shape[:2])
+        triangle = self.triangle[rows][:, None]
         many = np.flatnonzero(shared >= 0)
         if self.shared is not None and len(many):
             own, weights = self.shared.sample(shared[many], u[many])
             weights = self._drawn_in(weights.reshape(-1, 1, 3), own.ravel())
             points[many] = _at(self._scene.triangles[own.ravel()], weights).reshape(*own.shape, 3)
-            triangle = triangle.copy()
+            triangle = np.repeat(triangle, points.shape[1], axis=1)
             triangle[many] = own
         return self._sunk(triangle, points)
 
@@ -237,8 +237,7 @@ class TexelGeometry:
         triangle = np.broadcast_to(triangle[pressed], (len(pressed), points.shape[1])).ravel()
         chosen = points[pressed].reshape(-1, 3)
         sunk = layers.is_pressed(triangle, layers.weights(2 * triangle.astype(np.int64), chosen))
-        depth = SINK * surface_offset(self.triangles)
-        chosen[sunk] -= depth * self.face_normals[triangle[sunk]]
+        chosen[sunk] -= self._depth * self.face_normals[triangle[sunk]]
         points[pressed] = chosen.reshape(-1, *points.shape[1:])
         return points
 

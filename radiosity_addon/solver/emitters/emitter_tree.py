@@ -25,6 +25,9 @@ CURVED = 4.0
 MOST_SLANT = 0.35
 """… (the sine of the angle to the farthest from their mean), and none of its faces is turned away."""
 
+FAR = 10.0
+"""From this many radii on a node above the horizon sends like a disk of its area."""
+
 FLAT_SINE = 1e-5
 """Sine of the angle to the farthest normal of a flat group."""
 
@@ -98,7 +101,7 @@ class EmitterTree:
         # A repeated corner is an edge of no length.
         self.polygon[single] = corners[face][:, [0, 1, 2, 2]]
         self._scale[single] = weight[face] / np.maximum(triangle_areas(local[face]), 1e-300)
-        self.facing = facing
+        self.facing, self._vector = facing, length
         self.radius, self._slant = self._extremes(corners, normals)
         flat, coherent = self._slant <= FLAT_SINE, self._slant <= MOST_SLANT
         self._smallness = np.where(flat, 1.0 / NEAREST, np.where(coherent, 1.0 / CURVED, 0.0))
@@ -124,7 +127,7 @@ class EmitterTree:
     def ask(self, points: Array, normals: Array) -> EmitterPairs:
         """Return what points (n, 3) that face along `normals` get from nodes that together are all faces."""
         row, node = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
-        rows, nodes = [], []
+        rows, nodes, factors = [], [], []
         while len(row):
             along = points.take(row, axis=0) - self.center.take(node, axis=0)
             distance = np.sqrt(np.einsum("pk,pk->p", along, along))
@@ -138,20 +141,35 @@ class EmitterTree:
             single = self._single.take(node)
             whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
             settled = single | (whole & (radius <= self._smallness.take(node) * distance))
-            done = np.flatnonzero(seen & settled)
+            simple = seen & settled & (distance > FAR * radius) & (height < -radius)
+            done = np.flatnonzero(simple)
             rows.append(row[done])
             nodes.append(node[done])
+            factors.append(_disk_factor(-height[done], front[done], distance[done], self._vector[node[done]]))
+            done = np.flatnonzero(seen & settled & ~simple)
+            rows.append(row[done])
+            nodes.append(node[done])
+            factors.append(self._closed(points, normals, row[done], node[done]))
             more = np.flatnonzero(seen & ~settled)
             child = self._child.take(node[more])
             row = np.repeat(row[more], 2)
             node = np.stack([child, child + 1], axis=1).ravel()
-        row, node = np.concatenate(rows), np.concatenate(nodes)
-        shapes = self.polygon.take(node, axis=0)
-        factor = point_to_polygon(points.take(row, axis=0), normals.take(row, axis=0), shapes, contact=False)
-        factor *= self._scale.take(node)
+        row, node, factor = np.concatenate(rows), np.concatenate(nodes), np.concatenate(factors)
         lit = np.flatnonzero(factor > 0)
         lit = lit[np.argsort(row[lit], kind="stable")]
         return EmitterPairs(row[lit], node[lit], factor[lit])
+
+    def _closed(self, points: Array, normals: Array, row: Array, node: Array) -> Array:
+        """Return (p,) what points get from nodes in closed form."""
+        shapes = self.polygon.take(node, axis=0)
+        factor = point_to_polygon(points.take(row, axis=0), normals.take(row, axis=0), shapes, contact=False)
+        return np.asarray(factor * self._scale.take(node))
+
+
+def _disk_factor(rise: Array, front: Array, distance: Array, area: Array) -> Array:
+    """Return (p,) factors to disks: `rise` and `front` are the cosines times the distance."""
+    square = distance * distance
+    return np.asarray(rise * np.maximum(front, 0.0) * area / (square * (np.pi * square + area)))
 
 
 def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:

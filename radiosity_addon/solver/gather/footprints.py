@@ -30,6 +30,12 @@ this many are evaluated."""
 EDGE_DIFFERENCE = 0.5
 """Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
 
+CORNERS = np.array([[0.001, 0.001], [0.999, 0.001], [0.999, 0.999], [0.001, 0.999]], dtype=np.float32)
+"""Of a footprint, as its samples are placed."""
+
+NEGLIGIBLE = 0.01
+"""What is less than this part of the light expected is taken at the center: over a footprint it may vary."""
+
 DARKEST = 0.25
 """Noise is measured by the light expected, or by this part of the mean where that is darker."""
 
@@ -127,17 +133,37 @@ class SpreadPoints:
         if at.near is not None and jump.any():
             # An edge that only cuts a footprint's corner is found from its neighbors.
             lit = marked(len(gain), lambda rows: gain[rows] > 0)
-            rows = row_numbers(at.near(jump) | (at.near(lit) & at.near(~lit)))
+            counts = marked(len(gain), lambda rows: self.matters(light, gain[rows], rows))
+            crossed = at.near(jump)
+            doubted = row_numbers(at.near(lit) & at.near(~lit) & at.near(counts) & ~crossed)
+            crossed[doubted] = self.is_cut(light, doubted, lit[doubted])
+            rows = row_numbers(crossed & at.near(counts))
             gain[rows] = self.many(light, rows)
         return gain
 
-    def farthest(self, part: slice) -> Array:
+    def matters(self, light: Lamp | EmitterGroup, gain: Array, rows: slice) -> Array:
+        """Return (r,) bool: whether a light of this gain (r,) adds to what is expected at rows."""
+        return np.asarray(self.at.weight_of(gain * light.strength.mean(), rows) > NEGLIGIBLE)
+
+    def farthest(self, rows: Array) -> Array:
         """Return (r, 3) float64: the points of footprints that are farthest from their centers."""
-        return self.points(part)[np.arange(part.stop - part.start), self._farthest[part]]
+        apart = self._apart[rows, self._farthest[rows]]
+        return np.asarray(self.at.points[rows] + apart)
 
     def width(self, part: slice) -> Array:
         """Return (r,) how far a footprint reaches from its center, twice: about its width [m]."""
         return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
+
+    def is_cut(self, light: Lamp | EmitterGroup, rows: Array, lit: Array) -> Array:
+        """Return (r,) whether any corner of rows' footprints is lit unlike their centers, `lit` (r,)."""
+        cut = np.empty(len(rows), dtype=bool)
+        assert self.at.sampler is not None
+        for start in range(0, len(rows), CHUNK_POINTS):
+            chunk = slice(start, start + CHUNK_POINTS)
+            corners = np.broadcast_to(CORNERS, (len(rows[chunk]), *CORNERS.shape))
+            bright = self.gains(light, rows[chunk], self.at.sampler(rows[chunk], corners)) > 0.0
+            cut[chunk] = (bright != lit[chunk, None]).any(axis=1)
+        return cut
 
     def many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
         """Return (r,) the mean gain at some rows, by many points of each."""
@@ -177,9 +203,12 @@ def _at_centers(
         if isinstance(light, EmitterGroup) and least:
             varies = (own > least) | light.is_near(at.points[part], spread.width(part))
         else:
-            other = light.unit_irradiance(spread.farthest(part), normals)
-            varies = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
-            jump = np.abs(other - own) > EDGE_DIFFERENCE * np.maximum(own, other)
+            # A dark center says nothing of the rest.
+            asked = np.flatnonzero((own == 0.0) | spread.matters(light, own, part))
+            other = light.unit_irradiance(spread.farthest(part.start + asked), normals[asked])
+            here = own[asked]
+            varies[asked] = np.abs(other - here) > SAME_GAIN * np.maximum(here, other)
+            jump[asked] = np.abs(other - here) > EDGE_DIFFERENCE * np.maximum(here, other)
     return own, varies, jump
 
 

@@ -78,18 +78,12 @@ def first_links(
     """
     most = max(int(BUDGET * max_links), MIN_LINKS)
     wanted = WANTED / max(settings.error, 1e-9) ** 0.5
-    limits, pairs = PairLimits(float(hierarchy.faces.area.sum()), settings.min_area), None
-    while True:
-        while True:
-            count = estimated_links(hierarchy, shapes, limits)
-            may_be_coarser = FAINTER * limits.faint <= COARSEST_FAINT * settings.error
-            if count <= min(wanted, most) or (count <= most and not may_be_coarser):
-                break
-            limits = limits.looser()
+    limits = PairLimits(float(hierarchy.faces.area.sum()), settings.min_area)
+    limits, pairs = _fitting(hierarchy, shapes, limits, settings.error, wanted, most), None
+    while pairs is None:
         pairs = first_pairs(hierarchy, shapes, limits, int(LINK_SLACK * most))
-        if pairs is not None:
-            break
-        limits = limits.looser()
+        if pairs is None:
+            limits = limits.looser()
     count, (receiver, source) = hierarchy.n_clusters, pairs
     single = receiver >= count
     seed, threads = settings.seed, settings.threads
@@ -114,6 +108,31 @@ class PairLimits:
     def looser(self) -> PairLimits:
         """Return limits of fewer pairs: `faint` grows."""
         return replace(self, faint=FAINTER * self.faint if self.faint > 0.0 else FAINT)
+
+
+def _fitting(
+    hierarchy: Hierarchy, shapes: NodeShapes, limits: PairLimits, error: float, wanted: float, most: int
+) -> PairLimits:
+    """Return the strictest limits that keep the estimated links within what is wanted.
+
+    Where not even `COARSEST_FAINT` does, those from there on that keep them within `most`.
+    """
+    steps = [limits]
+    while FAINTER * steps[-1].faint <= COARSEST_FAINT * error:
+        steps.append(steps[-1].looser())
+    few, last = min(wanted, most), len(steps) - 1
+    if estimated_links(hierarchy, shapes, limits) <= few:
+        return limits
+    # Links only get fewer from step to step.
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        enough = estimated_links(hierarchy, shapes, steps[middle]) <= few
+        low, high = (low, middle) if enough else (middle, high)
+    found = steps[high]
+    while high == last and estimated_links(hierarchy, shapes, found) > most:
+        found = found.looser()
+    return found
 
 
 def first_pairs(
