@@ -8,12 +8,14 @@ rays met have rows.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
-from ...solver.gather import NOTHING, Footprints, GatheredHits, LocalPass
+from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbor
 
 WIDE_TEXEL = 4.0
@@ -32,10 +34,12 @@ class HitTable:
 
     def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
         self.local, self.geometry, self.crossings = local, geometry, crossings
+        elements = local.elements
+        self.element_cells = ElementCells(elements.hierarchy, elements.caster, geometry.texel_size)
         self.texel_cells = TexelCells(local.elements, geometry, crossings)
         self.texel_count = len(geometry)
         self.first_small = self.texel_count + local.elements.hierarchy.n_elements
-        self.first_cell = self.texel_count + len(local.elements.cells)
+        self.first_cell = self.texel_count + len(self.element_cells)
         self.end = self.first_cell + len(self.texel_cells)
         self._wide = geometry.texel_area > (WIDE_TEXEL * geometry.texel_size) ** 2
 
@@ -57,7 +61,8 @@ class HitTable:
         finer = elements.leaf_areas(hits.take(large)) < geometry.texel_area[hits.triangle[large]]
         found[large[finer]] = NO_TEXEL
         elsewhere = found == NO_TEXEL
-        cell = elements.cells_of(hits.take(elsewhere))
+        hits = hits.take(elsewhere)
+        cell = self.element_cells.at(elements.leaves_of(hits), hits)
         found[elsewhere] = np.where(cell == NOTHING, NOTHING, cell + self.texel_count)
         return found
 
@@ -95,20 +100,21 @@ class HitTable:
         own = (number >= self.texel_count) & (number < self.first_cell)
         cell = number >= self.first_cell
         element[texel] = below[number[texel]]
-        element[own] = self.local.elements.cells.leaf_of(self.element_cell(number[own]))
+        element[own] = self.element_cells.leaf_of(self.element_cell(number[own]))
         element[cell] = below[self.texel_cells.texel_of(self.texel_cell(number[cell]))]
         return element
 
     def reflectance(self, number: Array, of_element: bool, of_texels: Array) -> Array:
         """Return (p, 3) the reflectance of cells of elements, or of texels by that of theirs, (n, 3)."""
         if of_element:
-            return self.local.elements.cell_reflectance(self.element_cell(number))
+            leaf = self.element_cells.leaf_of(self.element_cell(number))
+            return self.local.elements.reflectance_of(leaf)
         return np.asarray(of_texels[self.texel_cells.texel_of(self.texel_cell(number))])
 
     def footprints(self, number: Array, of_element: bool) -> tuple[Footprints, Array]:
         """Return where cells of elements, or of texels, gather, and (p, 3) the normals of their surfaces."""
         if of_element:
-            at = self.local.elements.cells.footprints(self.element_cell(number))
+            at = self.element_cells.footprints(self.element_cell(number))
             return at, at.normals
         cell = self.texel_cell(number)
         return self.texel_cells.footprints(cell), self.texel_cells.upright(cell)
@@ -116,7 +122,9 @@ class HitTable:
     def lit_footprints(self, number: Array, of_element: bool) -> Footprints:
         """Return where cells of elements, or of texels, are lit by lamps."""
         if of_element:
-            return self.local.elements.lit_cells(self.element_cell(number))
+            cell, irradiance = self.element_cell(number), self.local.elements.irradiance
+            expected = irradiance[self.element_cells.leaf_of(cell)].mean(axis=1)
+            return replace(self.element_cells.footprints(cell), expected=expected)
         return self.texel_cells.lit(self.texel_cell(number))
 
     def gather(self, number: Array, of_element: bool, rays: int, progress: Progress = SILENT) -> GatheredHits:

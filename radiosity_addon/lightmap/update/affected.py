@@ -12,7 +12,7 @@ import numpy as np
 
 from ...numerics import Array
 from ...rays import SIGHT_LIFT, EmbreeCaster, RayCaster
-from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, MovedGeometry
+from ...solver.gather import UNNUMBERED, Boxes, ElementCells, ElementLookup, MovedGeometry
 from ..texels import Crossings, SmoothLift, TexelGeometry
 from ..transport import HitTable
 
@@ -98,16 +98,18 @@ class AffectedTexels:
         # A hit on a divided texel may have been answered by a neighbor.
         texels = self.texels | self.geometry.neighborhood(divided)
         numbers[: old.texel_count][texels] = UNNUMBERED
-        numbers[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
+        parts = old.element_cells.renumbered(table.element_cells)
+        stale = (parts < 0) | self._cells_near(table.local.elements, old.element_cells)
+        numbers[old.texel_count : old.first_cell] = np.where(stale, UNNUMBERED, parts + table.texel_count)
         cells = old.texel_cells.renumbered(table.texel_cells)
         texel = old.texel_cells.texel_of(np.arange(len(cells)))
         stale = (cells < 0) | texels[texel]
         numbers[old.first_cell :] = np.where(stale, UNNUMBERED, cells + table.first_cell)
         return numbers
 
-    def _cells_near(self, elements: ElementLookup) -> Array:
+    def _cells_near(self, elements: ElementLookup, cells: ElementCells) -> Array:
         """Return (cells,) bool: those of elements that moved, or that a box touches."""
-        hierarchy, cells = elements.hierarchy, elements.cells
+        hierarchy = elements.hierarchy
         offset = SIGHT_LIFT * elements.caster.surface_offset
         low, high = cells.bounds(np.arange(hierarchy.n_elements))
         touched = self.boxes.touching(low - offset, high + offset)

@@ -47,7 +47,7 @@ def _traced_again(hits: SubCellHits, standing: StandingHits, progress: Progress)
     local, affected = table.local, previous.affected
     at, upright = table.footprints(hits.number, hits.of_element)
     if hits.of_element:
-        widen = local.elements.cells.radius(table.element_cell(hits.number))
+        widen = table.element_cells.radius(table.element_cell(hits.number))
     else:
         widen = affected.widen[table.texel_cells.texel_of(table.texel_cell(hits.number))]
     nowhere = np.zeros((0, 1, 3))

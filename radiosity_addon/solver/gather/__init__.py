@@ -8,6 +8,7 @@ from __future__ import annotations
 from .boxes import Boxes
 from .bright_patches import AimedRays
 from .direct_light import DirectLight, LightQuery
+from .element_cells import ElementCells
 from .element_lookup import ElementLookup
 from .final_gather import GatheredHits
 from .footprints import Footprints
@@ -25,6 +26,7 @@ __all__ = [
     "Before",
     "Boxes",
     "DirectLight",
+    "ElementCells",
     "ElementLookup",
     "Footprints",
     "Gather",

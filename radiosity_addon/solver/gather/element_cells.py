@@ -4,6 +4,12 @@ A leaf may run on under a wall, and the hierarchy knows but one value for both s
 what a ray gets, one from inside a closed box would bring the lit floor outside with it. So a leaf
 answers as the part of it that sees its *anchor*, a point inside. Hits that do not see the anchor
 are answered by one of the leaf's sixteenths, each again the part that sees its own anchor.
+
+Nor does a leaf look alike from near: next to a wall it is darker than in its middle, and the strip of it
+that a panel covers is black, though the panel's gap lets lines of sight pass. So a leaf much larger than
+the texels answers as a whole only from farther than it is wide. Rays from nearer are answered by a cell no
+wider than their length, or than a few texels; and below a hood only by a cell below it, as with
+texels (`lightmap/texels/occlusion.py`).
 """
 
 from __future__ import annotations
@@ -19,7 +25,16 @@ from .footprints import Footprints
 from .hit_numbers import NOTHING
 
 CELLS_PER_ELEMENT = 16
-"""Smaller parts of a leaf: two levels of its quadtree further down."""
+"""Smaller parts of a leaf: two levels of its quadtree further down. Each of a large leaf has as many again."""
+
+MAX_DEPTH = 3
+"""How many times a large leaf is cut into sixteenths."""
+
+FINE = 2.0
+"""What is not wider than this many texels answers from near as well, and is not cut further."""
+
+HOOD = 0.25
+"""What is nearer above a large leaf than this part of a texel's width hoods it."""
 
 ANCHOR = np.array([0.3595, 0.3218, 0.3187])
 """Barycentric weights. Near the centroid, but off it: walls stand on round fractions of a floor."""
@@ -29,21 +44,37 @@ STARTS = 16
 
 
 class ElementCells:
-    """Numbers the parts of all leaves: the e elements first, then sixteen cells of each.
+    """Numbers the parts of all leaves: the e elements first, then the cells of each.
 
     hierarchy: Is not refined any more.
+    finest: Width of a texel [m]; with endless ones every leaf answers as a whole from near as well.
     """
 
-    def __init__(self, hierarchy: Hierarchy, caster: RayCaster) -> None:
-        self._hierarchy, self._caster = hierarchy, caster
+    def __init__(self, hierarchy: Hierarchy, caster: RayCaster, finest: float = np.inf) -> None:
+        self._hierarchy, self._caster, self._finest = hierarchy, caster, finest
+        self._size = np.sqrt(hierarchy.area[: hierarchy.n_elements])
+        depth = 1 + sum((self._size > FINE * finest * _cells(level)).astype(np.int8) for level in (1, 2))
+        self._depth = np.asarray(depth)
+        counts = np.array([_STARTS[level] for level in range(1, MAX_DEPTH + 1)])
+        ends = hierarchy.n_elements + np.cumsum(counts[self._depth - 1])
+        self._first = np.concatenate([[hierarchy.n_elements], ends])
 
     def __len__(self) -> int:
-        return (1 + CELLS_PER_ELEMENT) * self._hierarchy.n_elements
+        return int(self._first[-1])
 
     def leaf_of(self, part: Array) -> Array:
         """Return (p,) the leaf that each part is of."""
-        count = self._hierarchy.n_elements
-        return np.asarray(np.where(part < count, part, (part - count) // CELLS_PER_ELEMENT))
+        cell = np.searchsorted(self._first, part, side="right") - 1
+        return np.asarray(np.where(part < self._hierarchy.n_elements, part, cell))
+
+    def renumbered(self, other: ElementCells) -> Array:
+        """Return (parts,) int32 the numbers that these parts have among another's, or NOTHING."""
+        part = np.arange(len(self))
+        leaf = self.leaf_of(part)
+        moved = part - self._first[leaf] + other._first[leaf]
+        number = np.where(self._depth[leaf] == other._depth[leaf], moved, NOTHING)
+        number[: self._hierarchy.n_elements] = leaf[: self._hierarchy.n_elements]
+        return number.astype(np.int32)
 
     def at(self, leaf: Array, hits: Hits) -> Array:
         """Return (h,) int32: the part of its `leaf` that each hit sees the anchor of, the nearest of them.
@@ -52,18 +83,26 @@ class ElementCells:
         """
         part = leaf.copy()
         rows = np.flatnonzero(leaf != NOTHING)
-        normal = self._hierarchy.normal_of(leaf[rows])
-        position = self._positions(hits.take(rows)) + self._lift(normal)
-        anchor = ANCHOR @ self._hierarchy.corners[leaf[rows]] + self._lift(normal)
-        apart = np.flatnonzero(~free_segment(self._caster, position, anchor))
-        part[rows[apart]] = self._cells_at(leaf[rows[apart]], position[apart], normal[apart])
+        hits, leaf = hits.take(rows), leaf[rows]
+        normal = self._hierarchy.normal_of(leaf)
+        position = self._positions(hits) + self._lift(normal)
+        size, level = self._size[leaf], np.zeros(len(leaf), dtype=np.int8)
+        for finer in range(MAX_DEPTH):
+            level += (hits.distance * _cells(finer) < size) & self._is_large(leaf) & (self._depth[leaf] > finer)
+        whole = np.flatnonzero(level == 0)
+        anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
+        level[whole[~free_segment(self._caster, position[whole], anchor)]] = 1
+        near = np.flatnonzero(level)
+        part[rows[near]] = self._cells_at(leaf[near], position[near], normal[near], level[near])
         return part
 
     def footprints(self, part: Array) -> Footprints:
         """Return parts as footprints: their samples see the anchor."""
-        corners, normal = self._corners(part), self._hierarchy.normal_of(self.leaf_of(part))
+        corners, leaf = self._corners(part), self.leaf_of(part)
+        normal = self._hierarchy.normal_of(leaf)
         anchor, lift = ANCHOR @ corners, self._lift(normal)
-        sample = partial(_sample, self._caster, corners, anchor, lift)
+        hooded = self._is_large(leaf) & (part >= self._hierarchy.n_elements)
+        sample = partial(_sample, self, corners, anchor, lift, hooded)
         return Footprints(anchor, normal, part, sample, starts=STARTS)
 
     def radius(self, part: Array) -> Array:
@@ -77,28 +116,76 @@ class ElementCells:
         corners = self._hierarchy.corners[leaf]
         return corners.min(axis=1), corners.max(axis=1)
 
-    def _cells_at(self, leaf: Array, position: Array, normal: Array) -> Array:
-        """Return (h,) the cells of leaves whose anchors lifted points see, or NOTHING."""
-        cells = split_in_sixteen(self._hierarchy.corners[leaf])
-        anchors = np.einsum("c,hkcx->hkx", ANCHOR, cells) + self._lift(normal)[:, None]
-        order = np.linalg.norm(anchors - position[:, None], axis=2).argsort(axis=1, kind="stable")
+    def _is_large(self, leaf: Array) -> Array:
+        """Return (l,) bool: leaves of which texels would show more."""
+        return np.asarray(self._size[leaf] > FINE * self._finest)
+
+    def _cells_at(self, leaf: Array, position: Array, normal: Array, level: Array) -> Array:
+        """Return (h,) the cells, of a level or coarser, of leaves whose anchors lifted points see, or NOTHING."""
         found = np.full(len(leaf), NOTHING, dtype=np.int32)
-        waiting = np.arange(len(leaf))
+        for wanted in range(MAX_DEPTH, 0, -1):
+            rows = np.flatnonzero((found == NOTHING) & (level >= wanted))
+            if len(rows):
+                found[rows] = self._cells_of_level(leaf[rows], position[rows], normal[rows], wanted)
+        return found
+
+    def _cells_of_level(self, leaf: Array, position: Array, normal: Array, level: int) -> Array:
+        """Return (h,) the nearest cells of one level of leaves whose anchors lifted points see, or NOTHING."""
+        lift, every = self._lift(normal), np.arange(len(leaf))
+        corners, path = self._hierarchy.corners[leaf], np.zeros(len(leaf), dtype=np.int64)
+        for _ in range(level - 1):
+            cells = split_in_sixteen(corners)
+            nearest = _from_anchors(cells, position - lift).argmin(axis=1)
+            corners, path = cells[every, nearest], CELLS_PER_ELEMENT * (path + nearest)
+        cells = split_in_sixteen(corners)
+        anchors = np.einsum("c,hkcx->hkx", ANCHOR, cells) + lift[:, None]
+        order = _from_anchors(cells, position - lift).argsort(axis=1, kind="stable")
+        number = self._first[leaf] + _STARTS[level - 1] + path
+        hooded = self._is_large(leaf)
+        below = np.zeros(len(leaf), dtype=bool)
+        below[hooded] = self.below_hood(position[hooded], normal[hooded])
+        found = np.full(len(leaf), NOTHING, dtype=np.int32)
+        waiting = every
         for turn in range(CELLS_PER_ELEMENT):
+            if len(waiting) == 0:
+                break
             cell = order[waiting, turn]
-            seen = free_segment(self._caster, position[waiting], anchors[waiting, cell])
+            anchor = anchors[waiting, cell]
+            seen = free_segment(self._caster, position[waiting], anchor)
+            asked = np.flatnonzero(seen & hooded[waiting])
+            if len(asked):
+                _, first, inverse = np.unique(
+                    number[waiting[asked]] + cell[asked], return_index=True, return_inverse=True
+                )
+                one = asked[first]
+                hides = self.below_hood(anchor[one], normal[waiting[one]])[inverse.reshape(-1)]
+                seen[asked] = hides == below[waiting[asked]]
             rows = waiting[seen]
-            found[rows] = self._hierarchy.n_elements + CELLS_PER_ELEMENT * leaf[rows] + cell[seen]
+            found[rows] = number[rows] + cell[seen]
             waiting = waiting[~seen]
         return found
 
+    def sees(self, start: Array, end: Array) -> Array:
+        """Return (n,) whether nothing lies between (n, 3) points."""
+        return free_segment(self._caster, start, end)
+
+    def below_hood(self, lifted: Array, normal: Array) -> Array:
+        """Return (h,) whether something is close above (h, 3) lifted points."""
+        lift = SIGHT_LIFT * self._caster.surface_offset
+        height = np.full(len(lifted), max(HOOD * self._finest - lift, lift))
+        return np.asarray(~self._caster.unoccluded(lifted, normal, height))
+
     def _corners(self, part: Array) -> Array:
         """Return (p, 3, 3) the corners of the triangles that parts are of."""
-        corners = self._hierarchy.corners[self.leaf_of(part)]
-        count = self._hierarchy.n_elements
-        small = np.flatnonzero(part >= count)
-        cells = split_in_sixteen(corners[small])
-        corners[small] = cells[np.arange(len(small)), (part[small] - count) % CELLS_PER_ELEMENT]
+        leaf, count = self.leaf_of(part), self._hierarchy.n_elements
+        corners = self._hierarchy.corners[leaf]
+        number = part - self._first[leaf]
+        for level in range(1, MAX_DEPTH + 1):
+            rows = np.flatnonzero((part >= count) & (number >= _STARTS[level - 1]) & (number < _STARTS[level]))
+            path = number[rows] - _STARTS[level - 1]
+            for step in range(level - 1, -1, -1):
+                digit = path // CELLS_PER_ELEMENT**step % CELLS_PER_ELEMENT
+                corners[rows] = split_in_sixteen(corners[rows])[np.arange(len(rows)), digit]
         return np.asarray(corners)
 
     def _positions(self, hits: Hits) -> Array:
@@ -111,11 +198,40 @@ class ElementCells:
         return np.asarray(SIGHT_LIFT * self._caster.surface_offset * normal)
 
 
-def _sample(caster: RayCaster, corners: Array, anchor: Array, lift: Array, rows: Array, u: Array) -> Array:
-    """Return (r, k, 3) points of parts that see the anchor, or the anchor."""
+def _cells(level: int) -> int:
+    """Return how many cells of a level lie along a leaf's side."""
+    return 4**level
+
+
+_STARTS = [sum(CELLS_PER_ELEMENT**level for level in range(1, depth + 1)) for depth in range(MAX_DEPTH + 1)]
+"""Where the cells of each level begin among those of a leaf, from level 1, and where the last ones end."""
+
+
+def _from_anchors(cells: Array, position: Array) -> Array:
+    """Return (h, 16) squared distances of points from the anchors of cells (h, 16, 3, 3)."""
+    apart = np.einsum("c,hkcx->hkx", ANCHOR, cells) - position[:, None]
+    return np.asarray(np.einsum("hkx,hkx->hk", apart, apart))
+
+
+def _sample(
+    cells: ElementCells, corners: Array, anchor: Array, lift: Array, hooded: Array, rows: Array, u: Array
+) -> Array:
+    """Return (r, k, 3) points of parts that see the anchor, or the anchor.
+
+    hooded (p,) bool: Parts that lie below a hood, or not, as a whole.
+    """
     points = points_on_triangles(corners[rows], u)
     back = np.broadcast_to(anchor[rows][:, None], points.shape)
     above = lift[rows][:, None]
-    seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
-    # What lies behind a wall is not of this part.
-    return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))
+    seen = cells.sees((points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+    own = seen.reshape(points.shape[:2])
+    asked = np.flatnonzero(hooded[rows])
+    if len(asked):
+        chosen = rows[asked]
+        normal = lift[chosen] / np.linalg.norm(lift[chosen], axis=1, keepdims=True)
+        below = cells.below_hood(anchor[chosen] + lift[chosen], normal)
+        spots = (points[asked] + lift[chosen][:, None]).reshape(-1, 3)
+        under = cells.below_hood(spots, np.repeat(normal, points.shape[1], axis=0))
+        own[asked] &= under.reshape(len(asked), -1) == below[:, None]
+    # What lies behind a wall, or beyond a hood's rim, is not of this part.
+    return np.asarray(np.where(own[..., None], points, back))

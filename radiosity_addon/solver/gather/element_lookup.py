@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -12,8 +11,6 @@ from ...numerics import Array
 from ...rays import Hits, RayCaster
 from ..hierarchy import Hierarchy
 from ..state import SolverState
-from .element_cells import ElementCells
-from .footprints import Footprints
 from .hit_numbers import NOTHING, table_end, values_of
 
 
@@ -51,11 +48,6 @@ class ElementLookup:
         """What rays that leave the scene find."""
         return SkyTable(self.state.scene.lights)
 
-    @cached_property
-    def cells(self) -> ElementCells:
-        """The cells of leaf elements that rays may hit."""
-        return ElementCells(self.hierarchy, self.caster)
-
     def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; NOTHING for none or a black back."""
         side = (~hits.front).astype(np.int8)
@@ -74,10 +66,6 @@ class ElementLookup:
         leaf = np.full(len(face), NOTHING, dtype=np.int32)
         leaf[on_face] = self.hierarchy.leaf_at(face[on_face], barycentric[on_face])
         return leaf
-
-    def cells_of(self, hits: Hits) -> Array:
-        """Return (n,) int32: the cell of a leaf element under each hit; NOTHING for none or a black back."""
-        return self.cells.at(self.leaves_of(hits), hits)
 
     def leaf_areas(self, hits: Hits) -> Array:
         """Return (n,) float64 the area of the leaf element under each hit [m²]; infinite for none."""
@@ -99,20 +87,12 @@ class ElementLookup:
         another (e, 3) one.
         """
         arriving = self.irradiance if irradiance is None else irradiance
-        return np.asarray(self._reflectance(np.arange(self.hierarchy.n_elements)) * arriving)
+        return np.asarray(self.reflectance_of(np.arange(self.hierarchy.n_elements)) * arriving)
 
-    def cell_reflectance(self, cells: Array) -> Array:
-        """Return (p, 3) the reflectance of cells of leaf elements where their surface is there."""
-        return self._reflectance(self.cells.leaf_of(cells))
-
-    def _reflectance(self, elements: Array) -> Array:
+    def reflectance_of(self, elements: Array) -> Array:
+        """Return (k, 3) the reflectance of elements where their surface is there."""
         hierarchy = self.hierarchy
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
-
-    def lit_cells(self, cells: Array) -> Footprints:
-        """Return cells as footprints at which lamps are evaluated, and the irradiance expected there."""
-        expected = self.irradiance[self.cells.leaf_of(cells)].mean(axis=1)
-        return replace(self.cells.footprints(cells), expected=expected)
 
     def beyond(self) -> Array:
         """Return the last rows of a table of radiosity (see `table_end`)."""
