@@ -19,14 +19,12 @@ from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
 from .source_means import SourceMeans
 
-OFTEN = 32
-"""A cell that this many rays met matters: …"""
+RAYS_OF_MET = ((1, 4), (8, 16), (32, 64))
+"""A cell that so many rays met, or more, gathers with so many of its own. Were m rays that met it all of one
+point's n, a cell of r rays would add m² / (n r) of the point's own variance to it."""
 
-RAYS, MANY_RAYS = 16, 64
-"""… it gathers with more rays. Cells that few rays met answer few, and their noise averages out."""
-
-SHADOW_RAYS = 4
-"""Of a cell to each lamp for `RAYS` gather rays; in proportion for more."""
+RAYS_PER_SHADOW_RAY = 4
+"""Gather rays of a cell for each shadow ray to a lamp."""
 
 ROUNDS = 3
 """Rounds of asking the cells that cells met; beyond, the hierarchy's values stand for elements."""
@@ -95,7 +93,7 @@ class SubCellHits:
     @property
     def shadow_rays(self) -> int:
         """Of each to every lamp."""
-        return SHADOW_RAYS * self.rays // RAYS
+        return self.rays // RAYS_PER_SHADOW_RAY
 
     def take(self, chosen: Array) -> SubCellHits:
         """Return those of some cells, row numbers or a mask."""
@@ -173,12 +171,13 @@ class _SubCellGather:
         """Gather from the cells that were met and have not gathered yet."""
         new = np.flatnonzero((self._met > 0) & ~self._gathered)
         self._gathered[new] = True
-        number, often = new + self._first, self._met[new] >= OFTEN
+        number = new + self._first
+        step = np.searchsorted([met for met, _ in RAYS_OF_MET], self._met[new], side="right") - 1
         is_elements = number < self._table.first_cell
         groups = [
-            (of_element, rays, number[(is_elements == of_element) & (often == (rays > RAYS))])
+            (of_element, rays, number[(is_elements == of_element) & (step == own)])
             for of_element in (True, False)
-            for rays in (RAYS, MANY_RAYS)
+            for own, (_, rays) in enumerate(RAYS_OF_MET)
         ]
         for (of_element, rays, cells), part in progress.each(groups):
             if len(cells) == 0:

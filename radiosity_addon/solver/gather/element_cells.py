@@ -7,8 +7,8 @@ are answered by one of the leaf's sixteenths, each again the part that sees its 
 
 Nor does a leaf look alike from near: next to a wall it is darker than in its middle, and the strip of it
 that a panel covers is black, though the panel's gap lets lines of sight pass. So a leaf much larger than
-the texels answers as a whole only from farther than it is wide. Rays from nearer are answered by a cell no
-wider than their length, or than a few texels; and below a hood only by a cell below it, as with
+the texels answers as a whole only from farther than half its width. Rays from nearer are answered by a cell
+no wider than twice their length, or than a few texels; and below a hood only by a cell below it, as with
 texels (`lightmap/texels/occlusion.py`).
 """
 
@@ -30,8 +30,11 @@ CELLS_PER_ELEMENT = 16
 MAX_DEPTH = 3
 """How many times a large leaf is cut into sixteenths."""
 
-FINE = 2.0
+FINE = 3.0
 """What is not wider than this many texels answers from near as well, and is not cut further."""
+
+NEAR = 0.5
+"""From nearer than this many times its width a large leaf or cell does not answer."""
 
 HOOD = 0.25
 """What is nearer above a large leaf than this part of a texel's width hoods it."""
@@ -88,7 +91,7 @@ class ElementCells:
         position = self._positions(hits) + self._lift(normal)
         size, level = self._size[leaf], np.zeros(len(leaf), dtype=np.int8)
         for finer in range(MAX_DEPTH):
-            level += (hits.distance * _cells(finer) < size) & self._is_large(leaf) & (self._depth[leaf] > finer)
+            level += (hits.distance * _cells(finer) < NEAR * size) & self._is_large(leaf) & (self._depth[leaf] > finer)
         whole = np.flatnonzero(level == 0)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
         level[whole[~free_segment(self._caster, position[whole], anchor)]] = 1
