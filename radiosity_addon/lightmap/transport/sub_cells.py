@@ -26,8 +26,9 @@ point's n, a cell of r rays would add m² / (n r) of the point's own variance to
 RAYS_PER_SHADOW_RAY = 4
 """Gather rays of a cell for each shadow ray to a lamp."""
 
-ROUNDS = 3
-"""Rounds of asking the cells that cells met; beyond, the hierarchy's values stand for elements."""
+ROUNDS = 64
+"""Rounds of asking the cells that cells met, at most: each finds about half as many new ones. What is met in
+the last has the hierarchy's value, which may have leaked through a wall."""
 
 SWEEPS = 4
 """Sweeps among the cells for each over the texels, at most: the next one goes on where they ended."""
@@ -122,8 +123,9 @@ def gather_sub_cells(
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     gathering.take_known()
-    for _, part in progress.part(0.0, 0.7).each(range(ROUNDS)):
-        gathering.gather_new(part)
+    for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.7).turns(0.5), strict=False):
+        if not gathering.gather_new(turn):
+            break
         gathering.take_known()
     small = gathering.small()
     rows = TableRows(table.first_small, small)
@@ -167,8 +169,8 @@ class _SubCellGather:
                     more = taken[met] = self._gathered[cell[met]] = True
                     self.count(hits.sources[met])
 
-    def gather_new(self, progress: Progress) -> None:
-        """Gather from the cells that were met and have not gathered yet."""
+    def gather_new(self, progress: Progress) -> bool:
+        """Gather from the cells that were met and have not gathered yet; return whether there were any."""
         new = np.flatnonzero((self._met > 0) & ~self._gathered)
         self._gathered[new] = True
         number = new + self._first
@@ -185,6 +187,7 @@ class _SubCellGather:
             gathered = self._table.gather(cells, of_element, rays, part)
             self.count(gathered.sources)
             self._found.append(SubCellHits(of_element, cells, gathered.sources, tints=gathered.tints))
+        return len(new) > 0
 
     def small(self) -> Array:
         """Return (s,) int64, ascending: smaller cells of elements that were met, and of texels that gathered.

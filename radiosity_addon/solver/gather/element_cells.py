@@ -25,7 +25,7 @@ from .footprints import Footprints
 from .hit_numbers import NOTHING
 
 CELLS_PER_ELEMENT = 16
-"""Smaller parts of a leaf: two levels of its quadtree further down. Each of a large leaf has as many again."""
+"""Smaller parts of a leaf: two levels of its quadtree further down. In large leaves each has as many."""
 
 MAX_DEPTH = 3
 """How many times a large leaf is cut into sixteenths."""
@@ -91,7 +91,11 @@ class ElementCells:
         position = self._positions(hits) + self._lift(normal)
         size, level = self._size[leaf], np.zeros(len(leaf), dtype=np.int8)
         for finer in range(MAX_DEPTH):
-            level += (hits.distance * _cells(finer) < NEAR * size) & self._is_large(leaf) & (self._depth[leaf] > finer)
+            level += (
+                (hits.distance * _cells(finer) < NEAR * size)
+                & self._is_large(leaf)
+                & (self._depth[leaf] > finer)
+            )
         whole = np.flatnonzero(level == 0)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
         level[whole[~free_segment(self._caster, position[whole], anchor)]] = 1
@@ -124,7 +128,7 @@ class ElementCells:
         return np.asarray(self._size[leaf] > FINE * self._finest)
 
     def _cells_at(self, leaf: Array, position: Array, normal: Array, level: Array) -> Array:
-        """Return (h,) the cells, of a level or coarser, of leaves whose anchors lifted points see, or NOTHING."""
+        """Return (h,) the cells of a level, or a coarser one, whose anchors lifted points see, or NOTHING."""
         found = np.full(len(leaf), NOTHING, dtype=np.int32)
         for wanted in range(MAX_DEPTH, 0, -1):
             rows = np.flatnonzero((found == NOTHING) & (level >= wanted))
@@ -133,7 +137,7 @@ class ElementCells:
         return found
 
     def _cells_of_level(self, leaf: Array, position: Array, normal: Array, level: int) -> Array:
-        """Return (h,) the nearest cells of one level of leaves whose anchors lifted points see, or NOTHING."""
+        """Return (h,) the nearest cells of one level whose anchors lifted points see, or NOTHING."""
         lift, every = self._lift(normal), np.arange(len(leaf))
         corners, path = self._hierarchy.corners[leaf], np.zeros(len(leaf), dtype=np.int64)
         for _ in range(level - 1):
@@ -184,7 +188,8 @@ class ElementCells:
         corners = self._hierarchy.corners[leaf]
         number = part - self._first[leaf]
         for level in range(1, MAX_DEPTH + 1):
-            rows = np.flatnonzero((part >= count) & (number >= _STARTS[level - 1]) & (number < _STARTS[level]))
+            of_level = (number >= _STARTS[level - 1]) & (number < _STARTS[level])
+            rows = np.flatnonzero((part >= count) & of_level)
             path = number[rows] - _STARTS[level - 1]
             for step in range(level - 1, -1, -1):
                 digit = path // CELLS_PER_ELEMENT**step % CELLS_PER_ELEMENT

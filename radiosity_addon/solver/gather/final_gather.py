@@ -27,8 +27,8 @@ AIMED_PART = 4
 
 PRESSED = 1.5
 """A back so few surface offsets above the start of a ray is that of the surface it starts on, which lies
-against another one: points on it are sunk behind it (`lightmap/texels/texel_geometry.py`), for nothing reaches
-them, however bright the back may be where it is open."""
+against another one: points on it are sunk behind it (`lightmap/texels/texel_geometry.py`), because nothing
+reaches them, however bright the back is where it is open."""
 
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
