@@ -1,6 +1,5 @@
 """Atlases: polygons stay whole, charts stay apart and to scale, pages hold what was asked."""
 
-
 import numpy as np
 import pytest
 

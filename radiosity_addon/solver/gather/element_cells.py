@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from ...numerics import Array, points_at, points_on_triangles, split_in_sixteen
+from ...numerics import Array, points_at, points_on_triangles, split_in_four, split_in_sixteen, weights_at
 from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ..hierarchy import Hierarchy
 from .footprints import Footprints
@@ -139,15 +139,11 @@ class ElementCells:
     def _cells_of_level(self, leaf: Array, position: Array, normal: Array, level: int) -> Array:
         """Return (h,) the nearest cells of one level whose anchors lifted points see, or NOTHING."""
         lift, every = self._lift(normal), np.arange(len(leaf))
-        corners, path = self._hierarchy.corners[leaf], np.zeros(len(leaf), dtype=np.int64)
-        for _ in range(level - 1):
-            cells = split_in_sixteen(corners)
-            nearest = _from_anchors(cells, position - lift).argmin(axis=1)
-            corners, path = cells[every, nearest], CELLS_PER_ELEMENT * (path + nearest)
-        cells = split_in_sixteen(corners)
-        anchors = np.einsum("c,hkcx->hkx", ANCHOR, cells) + lift[:, None]
-        order = _from_anchors(cells, position - lift).argsort(axis=1, kind="stable")
-        number = self._first[leaf] + _STARTS[level - 1] + path
+        corners, path = self._cells_around(leaf, position, level - 1)
+        anchors = np.einsum("c,hkcx->hkx", ANCHOR, split_in_sixteen(corners)) + lift[:, None]
+        apart = anchors - position[:, None]
+        order = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        number = self._first[leaf] + _STARTS[level - 1] + CELLS_PER_ELEMENT * path
         hooded = self._is_large(leaf)
         below = np.zeros(len(leaf), dtype=bool)
         below[hooded] = self.below_hood(position[hooded], normal[hooded])
@@ -171,6 +167,19 @@ class ElementCells:
             found[rows] = number[rows] + cell[seen]
             waiting = waiting[~seen]
         return found
+
+    def _cells_around(self, leaf: Array, position: Array, level: int) -> tuple[Array, Array]:
+        """Return (h, 3, 3) the corners of the cells of a level below (h, 3) points, and their places."""
+        corners, every = self._hierarchy.corners[leaf], np.arange(len(leaf))
+        path = np.zeros(len(leaf), dtype=np.int64)
+        weights = weights_at(corners, position[:, None])[:, 0]
+        for _ in range(2 * level):
+            child = np.where(weights.max(axis=1) >= 0.5, weights.argmax(axis=1), 3)
+            at_corner = 2.0 * weights
+            at_corner[every, np.minimum(child, 2)] -= 1.0
+            weights = np.where((child == 3)[:, None], 1.0 - 2.0 * weights, at_corner)
+            corners, path = split_in_four(corners)[every, child], 4 * path + child
+        return corners, path
 
     def sees(self, start: Array, end: Array) -> Array:
         """Return (n,) whether nothing lies between (n, 3) points."""
@@ -213,12 +222,6 @@ def _cells(level: int) -> int:
 
 _STARTS = [sum(CELLS_PER_ELEMENT**level for level in range(1, depth + 1)) for depth in range(MAX_DEPTH + 1)]
 """Where the cells of each level begin among those of a leaf, from level 1, and where the last ones end."""
-
-
-def _from_anchors(cells: Array, position: Array) -> Array:
-    """Return (h, 16) squared distances of points from the anchors of cells (h, 16, 3, 3)."""
-    apart = np.einsum("c,hkcx->hkx", ANCHOR, cells) - position[:, None]
-    return np.asarray(np.einsum("hkx,hkx->hk", apart, apart))
 
 
 def _sample(
