@@ -237,10 +237,14 @@ class TexelGeometry:
         triangle = np.broadcast_to(triangle[pressed], (len(pressed), points.shape[1])).ravel()
         chosen = points[pressed].reshape(-1, 3)
         sunk = layers.is_pressed(triangle, layers.weights(2 * triangle.astype(np.int64), chosen))
-        depth = SINK * surface_offset(self.triangles)
-        chosen[sunk] -= depth * self.face_normals[triangle[sunk]]
+        chosen[sunk] -= SINK * self._offset * self.face_normals[triangle[sunk]]
         points[pressed] = chosen.reshape(-1, *points.shape[1:])
         return points
+
+    @cached_property
+    def _offset(self) -> float:
+        """How far rays start off surfaces [m]."""
+        return surface_offset(self.triangles)
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""

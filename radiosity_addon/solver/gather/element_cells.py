@@ -42,6 +42,12 @@ HOOD = 0.25
 ANCHOR = np.array([0.3595, 0.3218, 0.3187])
 """Barycentric weights. Near the centroid, but off it: walls stand on round fractions of a floor."""
 
+_CHILDREN = split_in_four(np.eye(3)[None])[0]
+"""(4, 3, 3) weights of a triangle's corners at those of its four children."""
+
+_ANCHORS = ANCHOR @ split_in_sixteen(np.eye(3)[None])[0]
+"""(16, 3) weights of a triangle's corners at the anchors of its sixteenths."""
+
 STARTS = 16
 """Points of a part that its gather rays start from: each costs a ray to the anchor."""
 
@@ -140,7 +146,7 @@ class ElementCells:
         """Return (h,) the nearest cells of one level whose anchors lifted points see, or NOTHING."""
         lift, every = self._lift(normal), np.arange(len(leaf))
         corners, path = self._cells_around(leaf, position, level - 1)
-        anchors = np.einsum("c,hkcx->hkx", ANCHOR, split_in_sixteen(corners)) + lift[:, None]
+        anchors = _ANCHORS @ corners + lift[:, None]
         apart = anchors - position[:, None]
         order = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
         number = self._first[leaf] + _STARTS[level - 1] + CELLS_PER_ELEMENT * path
@@ -178,7 +184,7 @@ class ElementCells:
             at_corner = 2.0 * weights
             at_corner[every, np.minimum(child, 2)] -= 1.0
             weights = np.where((child == 3)[:, None], 1.0 - 2.0 * weights, at_corner)
-            corners, path = split_in_four(corners)[every, child], 4 * path + child
+            corners, path = _CHILDREN[child] @ corners, 4 * path + child
         return corners, path
 
     def sees(self, start: Array, end: Array) -> Array:
