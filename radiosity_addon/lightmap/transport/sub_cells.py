@@ -26,9 +26,9 @@ point's n, a cell of r rays would add m² / (n r) of the point's own variance to
 RAYS_PER_SHADOW_RAY = 4
 """Gather rays of a cell for each shadow ray to a lamp."""
 
-ROUNDS = 64
-"""Rounds of asking the cells that cells met, at most: each finds about half as many new ones. What is met in
-the last has the hierarchy's value, which may have leaked through a wall."""
+ROUNDS = 16
+"""Rounds of asking the cells that cells met, at most: each finds about half as many new ones, which count
+less and less. What is met in the last has the hierarchy's value."""
 
 SWEEPS = 4
 """Sweeps among the cells for each over the texels, at most: the next one goes on where they ended."""
@@ -101,6 +101,26 @@ class SubCellHits:
         gains = None if self.gains is None else self.gains.take(chosen)
         tints = None if self.tints is None else self.tints[chosen]
         return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains, tints)
+
+    @staticmethod
+    def joined(parts: Sequence[SubCellHits]) -> list[SubCellHits]:
+        """Put cells of one kind and with as many rays together."""
+        kinds: dict[tuple[bool, int], list[SubCellHits]] = {}
+        for hits in parts:
+            kinds.setdefault((hits.of_element, hits.rays), []).append(hits)
+        return [_joined(kind) for kind in kinds.values()]
+
+
+def _joined(parts: list[SubCellHits]) -> SubCellHits:
+    gains = [hits.gains for hits in parts if hits.gains is not None]
+    tints = [hits.tints for hits in parts if hits.tints is not None]
+    return SubCellHits(
+        parts[0].of_element,
+        np.concatenate([hits.number for hits in parts]),
+        np.concatenate([hits.sources for hits in parts]),
+        LightGains.joined(gains) if gains else None,
+        np.concatenate(tints) if tints else None,
+    )
 
 
 def gather_sub_cells(
@@ -202,7 +222,8 @@ class _SubCellGather:
     def links(self, rows: TableRows, reflectance: Array, progress: Progress) -> list[SubCellLinks]:
         """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""
         table, direct = self._table, self._table.local.direct
-        gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any()), *self._found]
+        gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any())]
+        gathered += SubCellHits.joined(self._found)
         made = []
         for hits, part in progress.each(gathered):
             if hits.gains is None:
