@@ -59,6 +59,19 @@ def test_the_underside_is_dark(rise: float, degrees: float, away: float) -> None
     assert values(found["Ground"]).mean() > 1.0
 
 
+def test_the_underside_is_dark_though_light_falls_on_its_own_back() -> None:
+    """The box is open at one side; points below it are sunk into its bottom, and see that from inside.
+
+    Of those at the open side one ray in thousands passes the bottom's edge.
+    """
+    opened = BOX[BOX[..., 1].max(axis=1) > -0.5]
+    assert len(opened) == len(BOX) - 2
+    found = pages(opened)
+    assert np.quantile(values(found["Bottom"]), 0.99) == 0.0
+    assert values(found["Bottom"]).mean() < 1e-4
+    assert values(found["Box"]).mean() > 1.0
+
+
 def test_so_it_is_in_a_room_and_without_one_where_the_box_reaches_beyond() -> None:
     """On a floor that is a room's, the underside is dark; over the rim of a table it is lit."""
     room = box_room((6, 6, 3))[0] - (3, 3, 0)

@@ -15,21 +15,24 @@ from tests.rooms import gray_scene, rectangle, solid_box
 FLOOR = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
 
 
-def parts_with(*around: np.ndarray) -> tuple[ElementCells, Hierarchy]:
+def parts_with(*around: np.ndarray, finest: float = np.inf) -> tuple[ElementCells, Hierarchy]:
     triangles = np.concatenate([FLOOR, *around])
     scene = gray_scene(triangles, two_sided=True)
     hierarchy = Hierarchy(scene)
-    return ElementCells(hierarchy, EmbreeCaster(scene.triangles)), hierarchy
+    return ElementCells(hierarchy, EmbreeCaster(scene.triangles), finest), hierarchy
 
 
-def hits_on_floor(position: np.ndarray, front: bool = True) -> Hits:
+def hits_on_floor(position: np.ndarray, front: bool = True, distance: float = 1.0) -> Hits:
     """Hits at points of the unit square; FLOOR is (a, b, c), then (a, c, d)."""
     x, y = position.T
     upper = y > x
     weights = np.where(upper[:, None], np.stack([x, y - x], axis=1), np.stack([x - y, y], axis=1))
     count = len(position)
     return Hits(
-        upper.astype(np.int32), weights.astype(np.float32), np.full(count, front), np.ones(count, np.float32)
+        upper.astype(np.int32),
+        weights.astype(np.float32),
+        np.full(count, front),
+        np.full(count, distance, np.float32),
     )
 
 
@@ -92,3 +95,68 @@ def test_a_box_between_all_anchors_is_dark() -> None:
     parts, hierarchy = parts_with(solid_box(low, high))
     hits = hits_on_floor(np.array([[0.51, 0.11]]))
     assert parts.at(leaves_of(hierarchy, hits), hits)[0] == NOTHING
+
+
+@pytest.mark.parametrize("distance", [1.0, 0.2, 0.05, 0.01, 0.001])
+def test_near_hits_get_parts_as_fine_as_they_are_near(distance: float) -> None:
+    """A part is no wider than twice the distance, or than three texels, and the hit is next to its anchor."""
+    texel = 0.01
+    parts, hierarchy = parts_with(finest=texel)
+    position = spread()
+    hits = hits_on_floor(position, distance=distance)
+    leaf = leaves_of(hierarchy, hits)
+    part = parts.at(leaf, hits)
+    np.testing.assert_array_equal(parts.leaf_of(part), leaf)
+    assert part.max() < len(parts)
+    anchor, size, radius = parts.footprints(part).points, np.sqrt(hierarchy.area[leaf]), parts.radius(part)
+    # All parts are similar to the leaf.
+    width = size * radius / parts.radius(leaf)
+    assert (width <= max(2.0 * distance, 3.0 * texel) * (1 + 1e-6)).all()
+    assert (np.linalg.norm(anchor[:, :2] - position, axis=1) <= radius).all()
+    assert distance < 0.3 or (part == leaf).all()
+
+
+def test_samples_of_parts_fill_them() -> None:
+    """Of every level: their mean is the middle of the part."""
+    parts, hierarchy = parts_with(finest=0.01)
+    at_levels = [
+        parts.at(leaves_of(hierarchy, hits), hits)[0]
+        for hits in (hits_on_floor(np.array([[0.3, 0.55]]), distance=d) for d in (1.0, 0.1, 0.05, 0.003))
+    ]
+    assert len(set(at_levels)) == 4
+    part = np.array(at_levels)
+    at = parts.footprints(part)
+    assert at.sampler is not None
+    u = np.random.default_rng(6).random((4, 4000, 2))
+    samples = at.sampler(np.arange(4), u)
+    apart = np.linalg.norm(samples - at.points[:, None], axis=2).max(axis=1)
+    np.testing.assert_allclose(apart, parts.radius(part), rtol=0.05)
+    # The anchor is next to the centroid.
+    offset = np.linalg.norm(samples.mean(axis=1) - at.points, axis=1)
+    assert (offset < 0.1 * parts.radius(part)).all()
+
+
+def test_below_a_hood_answer_parts_below_it() -> None:
+    """A sheet a millimeter above half of the floor, which lines of sight pass below."""
+    rim, texel = 0.5, 0.02
+    parts, hierarchy = parts_with(rectangle((rim, -1, 0.001), (1, 0, 0), (0, 3, 0)), finest=texel)
+    position = spread()
+    hits = hits_on_floor(position, distance=0.0015)
+    part = parts.at(leaves_of(hierarchy, hits), hits)
+    assert (part != NOTHING).mean() > 0.99
+    some, below = part[part != NOTHING], position[part != NOTHING, 0] > rim
+    at = parts.footprints(some)
+    assert at.sampler is not None
+    np.testing.assert_array_equal(at.points[:, 0] > rim, below)
+    samples = at.sampler(np.arange(len(some)), np.random.default_rng(7).random((len(some), 8, 2)))
+    np.testing.assert_array_equal(samples[..., 0] > rim, np.broadcast_to(below[:, None], samples.shape[:2]))
+
+
+def test_parts_are_renumbered_where_leaves_are_cut_alike() -> None:
+    fine, hierarchy = parts_with(finest=0.01)
+    np.testing.assert_array_equal(fine.renumbered(fine), np.arange(len(fine)))
+    coarse, _ = parts_with(finest=0.05)
+    number = fine.renumbered(coarse)
+    assert len(coarse) < len(fine) == len(number)
+    np.testing.assert_array_equal(number[: hierarchy.n_elements], np.arange(hierarchy.n_elements))
+    assert (number[hierarchy.n_elements :] == NOTHING).all()

@@ -19,17 +19,16 @@ from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
 from .source_means import SourceMeans
 
-OFTEN = 32
-"""A cell that this many rays met matters: …"""
+RAYS_OF_MET = ((1, 4), (8, 16), (32, 64))
+"""A cell that so many rays met, or more, gathers with so many of its own. Were m rays that met it all of one
+point's n, a cell of r rays would add m² / (n r) of the point's own variance to it."""
 
-RAYS, MANY_RAYS = 16, 64
-"""… it gathers with more rays. Cells that few rays met answer few, and their noise averages out."""
+RAYS_PER_SHADOW_RAY = 4
+"""Gather rays of a cell for each shadow ray to a lamp."""
 
-SHADOW_RAYS = 4
-"""Of a cell to each lamp for `RAYS` gather rays; in proportion for more."""
-
-ROUNDS = 3
-"""Rounds of asking the cells that cells met; beyond, the hierarchy's values stand for elements."""
+ROUNDS = 6
+"""Rounds of asking the cells that cells met, at most: each finds about half as many new ones, which count
+less and less. What is met in the last has the hierarchy's value."""
 
 SWEEPS = 4
 """Sweeps among the cells for each over the texels, at most: the next one goes on where they ended."""
@@ -95,13 +94,33 @@ class SubCellHits:
     @property
     def shadow_rays(self) -> int:
         """Of each to every lamp."""
-        return SHADOW_RAYS * self.rays // RAYS
+        return self.rays // RAYS_PER_SHADOW_RAY
 
     def take(self, chosen: Array) -> SubCellHits:
         """Return those of some cells, row numbers or a mask."""
         gains = None if self.gains is None else self.gains.take(chosen)
         tints = None if self.tints is None else self.tints[chosen]
         return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains, tints)
+
+    @staticmethod
+    def joined(parts: Sequence[SubCellHits]) -> list[SubCellHits]:
+        """Put cells of one kind and with as many rays together."""
+        kinds: dict[tuple[bool, int], list[SubCellHits]] = {}
+        for hits in parts:
+            kinds.setdefault((hits.of_element, hits.rays), []).append(hits)
+        return [_joined(kind) for kind in kinds.values()]
+
+
+def _joined(parts: list[SubCellHits]) -> SubCellHits:
+    gains = [hits.gains for hits in parts if hits.gains is not None]
+    tints = [hits.tints for hits in parts if hits.tints is not None]
+    return SubCellHits(
+        parts[0].of_element,
+        np.concatenate([hits.number for hits in parts]),
+        np.concatenate([hits.sources for hits in parts]),
+        LightGains.joined(gains) if gains else None,
+        np.concatenate(tints) if tints else None,
+    )
 
 
 def gather_sub_cells(
@@ -124,8 +143,9 @@ def gather_sub_cells(
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     gathering.take_known()
-    for _, part in progress.part(0.0, 0.7).each(range(ROUNDS)):
-        gathering.gather_new(part)
+    for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.7).turns(0.5), strict=False):
+        if not gathering.gather_new(turn):
+            break
         gathering.take_known()
     small = gathering.small()
     rows = TableRows(table.first_small, small)
@@ -169,16 +189,17 @@ class _SubCellGather:
                     more = taken[met] = self._gathered[cell[met]] = True
                     self.count(hits.sources[met])
 
-    def gather_new(self, progress: Progress) -> None:
-        """Gather from the cells that were met and have not gathered yet."""
+    def gather_new(self, progress: Progress) -> bool:
+        """Gather from the cells that were met and have not gathered yet; return whether there were any."""
         new = np.flatnonzero((self._met > 0) & ~self._gathered)
         self._gathered[new] = True
-        number, often = new + self._first, self._met[new] >= OFTEN
+        number = new + self._first
+        step = np.searchsorted([met for met, _ in RAYS_OF_MET], self._met[new], side="right") - 1
         is_elements = number < self._table.first_cell
         groups = [
-            (of_element, rays, number[(is_elements == of_element) & (often == (rays > RAYS))])
+            (of_element, rays, number[(is_elements == of_element) & (step == own)])
             for of_element in (True, False)
-            for rays in (RAYS, MANY_RAYS)
+            for own, (_, rays) in enumerate(RAYS_OF_MET)
         ]
         for (of_element, rays, cells), part in progress.each(groups):
             if len(cells) == 0:
@@ -186,6 +207,7 @@ class _SubCellGather:
             gathered = self._table.gather(cells, of_element, rays, part)
             self.count(gathered.sources)
             self._found.append(SubCellHits(of_element, cells, gathered.sources, tints=gathered.tints))
+        return len(new) > 0
 
     def small(self) -> Array:
         """Return (s,) int64, ascending: smaller cells of elements that were met, and of texels that gathered.
@@ -200,7 +222,8 @@ class _SubCellGather:
     def links(self, rows: TableRows, reflectance: Array, progress: Progress) -> list[SubCellLinks]:
         """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""
         table, direct = self._table, self._table.local.direct
-        gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any()), *self._found]
+        gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any())]
+        gathered += SubCellHits.joined(self._found)
         made = []
         for hits, part in progress.each(gathered):
             if hits.gains is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base import Progress
-from ...solver.gather import UNNUMBERED, AimedRays, Before, GatheredHits, LightGains
+from ...solver.gather import UNNUMBERED, AimedRays, Before, GatheredHits
 from ..transport import SubCellHits
 from .moved_light import sub_cell_gains
 from .previous import StandingHits
@@ -13,7 +13,7 @@ from .previous import StandingHits
 
 def kept_cells(standing: StandingHits, progress: Progress) -> list[SubCellHits]:
     """Return the cells that still stand, those of one kind together, with what their rays meet now."""
-    kinds: dict[tuple[bool, int], list[SubCellHits]] = {}
+    found: list[SubCellHits] = []
     for of_kind in standing.previous.lit.transport.cells.links:
         number = standing.numbers(of_kind.rows)
         stays = number != UNNUMBERED
@@ -24,21 +24,9 @@ def kept_cells(standing: StandingHits, progress: Progress) -> list[SubCellHits]:
         tints = None if of_kind.tints is None else of_kind.tints[stays]
         kept = SubCellHits(bool(of_element.any()), number[stays], sources, gains, tints)
         if len(kept.number):
-            kinds.setdefault((kept.of_element, kept.rays), []).append(kept)
-    joined = [_joined(hits) for hits in kinds.values()]
+            found.append(kept)
+    joined = SubCellHits.joined(found)
     return [_traced_again(hits, standing, part) for hits, part in progress.each(joined)]
-
-
-def _joined(parts: list[SubCellHits]) -> SubCellHits:
-    gains = [hits.gains for hits in parts if hits.gains is not None]
-    tints = [hits.tints for hits in parts if hits.tints is not None]
-    return SubCellHits(
-        parts[0].of_element,
-        np.concatenate([hits.number for hits in parts]),
-        np.concatenate([hits.sources for hits in parts]),
-        LightGains.joined(gains),
-        np.concatenate(tints) if tints else None,
-    )
 
 
 def _traced_again(hits: SubCellHits, standing: StandingHits, progress: Progress) -> SubCellHits:

@@ -7,8 +7,8 @@ are answered by one of the leaf's sixteenths, each again the part that sees its 
 
 Nor does a leaf look alike from near: next to a wall it is darker than in its middle, and the strip of it
 that a panel covers is black, though the panel's gap lets lines of sight pass. So a leaf much larger than
-the texels answers as a whole only from farther than it is wide. Rays from nearer are answered by a cell no
-wider than their length, or than a few texels; and below a hood only by a cell below it, as with
+the texels answers as a whole only from farther than half its width. Rays from nearer are answered by a cell
+no wider than twice their length, or than a few texels; and below a hood only by a cell below it, as with
 texels (`lightmap/texels/occlusion.py`).
 """
 
@@ -18,26 +18,35 @@ from functools import partial
 
 import numpy as np
 
-from ...numerics import Array, points_at, points_on_triangles, split_in_sixteen
+from ...numerics import Array, points_at, points_on_triangles, split_in_four, split_in_sixteen, weights_at
 from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ..hierarchy import Hierarchy
 from .footprints import Footprints
 from .hit_numbers import NOTHING
 
 CELLS_PER_ELEMENT = 16
-"""Smaller parts of a leaf: two levels of its quadtree further down. Each of a large leaf has as many again."""
+"""Smaller parts of a leaf: two levels of its quadtree further down. In large leaves each has as many."""
 
 MAX_DEPTH = 3
 """How many times a large leaf is cut into sixteenths."""
 
-FINE = 2.0
+FINE = 3.0
 """What is not wider than this many texels answers from near as well, and is not cut further."""
+
+NEAR = 0.5
+"""From nearer than this many times its width a large leaf or cell does not answer."""
 
 HOOD = 0.25
 """What is nearer above a large leaf than this part of a texel's width hoods it."""
 
 ANCHOR = np.array([0.3595, 0.3218, 0.3187])
 """Barycentric weights. Near the centroid, but off it: walls stand on round fractions of a floor."""
+
+_CHILDREN = split_in_four(np.eye(3)[None])[0]
+"""(4, 3, 3) weights of a triangle's corners at those of its four children."""
+
+_ANCHORS = ANCHOR @ split_in_sixteen(np.eye(3)[None])[0]
+"""(16, 3) weights of a triangle's corners at the anchors of its sixteenths."""
 
 STARTS = 16
 """Points of a part that its gather rays start from: each costs a ray to the anchor."""
@@ -88,7 +97,11 @@ class ElementCells:
         position = self._positions(hits) + self._lift(normal)
         size, level = self._size[leaf], np.zeros(len(leaf), dtype=np.int8)
         for finer in range(MAX_DEPTH):
-            level += (hits.distance * _cells(finer) < size) & self._is_large(leaf) & (self._depth[leaf] > finer)
+            level += (
+                (hits.distance * _cells(finer) < NEAR * size)
+                & self._is_large(leaf)
+                & (self._depth[leaf] > finer)
+            )
         whole = np.flatnonzero(level == 0)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
         level[whole[~free_segment(self._caster, position[whole], anchor)]] = 1
@@ -121,7 +134,7 @@ class ElementCells:
         return np.asarray(self._size[leaf] > FINE * self._finest)
 
     def _cells_at(self, leaf: Array, position: Array, normal: Array, level: Array) -> Array:
-        """Return (h,) the cells, of a level or coarser, of leaves whose anchors lifted points see, or NOTHING."""
+        """Return (h,) the cells of a level, or a coarser one, whose anchors lifted points see, or NOTHING."""
         found = np.full(len(leaf), NOTHING, dtype=np.int32)
         for wanted in range(MAX_DEPTH, 0, -1):
             rows = np.flatnonzero((found == NOTHING) & (level >= wanted))
@@ -130,17 +143,13 @@ class ElementCells:
         return found
 
     def _cells_of_level(self, leaf: Array, position: Array, normal: Array, level: int) -> Array:
-        """Return (h,) the nearest cells of one level of leaves whose anchors lifted points see, or NOTHING."""
+        """Return (h,) the nearest cells of one level whose anchors lifted points see, or NOTHING."""
         lift, every = self._lift(normal), np.arange(len(leaf))
-        corners, path = self._hierarchy.corners[leaf], np.zeros(len(leaf), dtype=np.int64)
-        for _ in range(level - 1):
-            cells = split_in_sixteen(corners)
-            nearest = _from_anchors(cells, position - lift).argmin(axis=1)
-            corners, path = cells[every, nearest], CELLS_PER_ELEMENT * (path + nearest)
-        cells = split_in_sixteen(corners)
-        anchors = np.einsum("c,hkcx->hkx", ANCHOR, cells) + lift[:, None]
-        order = _from_anchors(cells, position - lift).argsort(axis=1, kind="stable")
-        number = self._first[leaf] + _STARTS[level - 1] + path
+        corners, path = self._cells_around(leaf, position, level - 1)
+        anchors = _ANCHORS @ corners + lift[:, None]
+        apart = anchors - position[:, None]
+        order = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        number = self._first[leaf] + _STARTS[level - 1] + CELLS_PER_ELEMENT * path
         hooded = self._is_large(leaf)
         below = np.zeros(len(leaf), dtype=bool)
         below[hooded] = self.below_hood(position[hooded], normal[hooded])
@@ -165,6 +174,19 @@ class ElementCells:
             waiting = waiting[~seen]
         return found
 
+    def _cells_around(self, leaf: Array, position: Array, level: int) -> tuple[Array, Array]:
+        """Return (h, 3, 3) the corners of the cells of a level below (h, 3) points, and their places."""
+        corners, every = self._hierarchy.corners[leaf], np.arange(len(leaf))
+        path = np.zeros(len(leaf), dtype=np.int64)
+        weights = weights_at(corners, position[:, None])[:, 0]
+        for _ in range(2 * level):
+            child = np.where(weights.max(axis=1) >= 0.5, weights.argmax(axis=1), 3)
+            at_corner = 2.0 * weights
+            at_corner[every, np.minimum(child, 2)] -= 1.0
+            weights = np.where((child == 3)[:, None], 1.0 - 2.0 * weights, at_corner)
+            corners, path = _CHILDREN[child] @ corners, 4 * path + child
+        return corners, path
+
     def sees(self, start: Array, end: Array) -> Array:
         """Return (n,) whether nothing lies between (n, 3) points."""
         return free_segment(self._caster, start, end)
@@ -181,7 +203,8 @@ class ElementCells:
         corners = self._hierarchy.corners[leaf]
         number = part - self._first[leaf]
         for level in range(1, MAX_DEPTH + 1):
-            rows = np.flatnonzero((part >= count) & (number >= _STARTS[level - 1]) & (number < _STARTS[level]))
+            of_level = (number >= _STARTS[level - 1]) & (number < _STARTS[level])
+            rows = np.flatnonzero((part >= count) & of_level)
             path = number[rows] - _STARTS[level - 1]
             for step in range(level - 1, -1, -1):
                 digit = path // CELLS_PER_ELEMENT**step % CELLS_PER_ELEMENT
@@ -205,12 +228,6 @@ def _cells(level: int) -> int:
 
 _STARTS = [sum(CELLS_PER_ELEMENT**level for level in range(1, depth + 1)) for depth in range(MAX_DEPTH + 1)]
 """Where the cells of each level begin among those of a leaf, from level 1, and where the last ones end."""
-
-
-def _from_anchors(cells: Array, position: Array) -> Array:
-    """Return (h, 16) squared distances of points from the anchors of cells (h, 16, 3, 3)."""
-    apart = np.einsum("c,hkcx->hkx", ANCHOR, cells) - position[:, None]
-    return np.asarray(np.einsum("hkx,hkx->hk", apart, apart))
 
 
 def _sample(

@@ -25,6 +25,11 @@ CHUNK_RAYS = 1 << 16
 AIMED_PART = 4
 """One ray is aimed for this many cosine-distributed ones, where any are aimed."""
 
+PRESSED = 1.5
+"""A back so few surface offsets above the start of a ray is that of the surface it starts on, which lies
+against another one: points on it are sunk behind it (`lightmap/texels/texel_geometry.py`), because nothing
+reaches them, however bright the back is where it is open."""
+
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
 
@@ -204,7 +209,7 @@ class FinalGather:
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
         nearer = nearer.astype(np.float64) / self._rays
-        return changed, self._found(hits, along[other]), hits, nearer
+        return changed, self._found(hits, along[other], self._surface_normals[rows[changed]]), hits, nearer
 
     def _cosine(
         self, rows: Array, bright: BrightElements | None, shares: Array | None
@@ -214,7 +219,8 @@ class FinalGather:
         directions, upward = self.directions(rows)
         start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)
         hits = self._caster.intersect(start.reshape(-1, 3), directions.reshape(-1, 3))
-        found = self._found(hits, directions.reshape(-1, 3)).reshape(len(rows), rays)
+        upright = np.repeat(self._surface_normals[rows], rays, axis=0)
+        found = self._found(hits, directions.reshape(-1, 3), upright).reshape(len(rows), rays)
         found[~upward] = NOTHING
         if bright is not None and shares is not None:
             found[bright.left_out(shares, hits, self._leaves_of).reshape(found.shape)] = NOTHING
@@ -230,10 +236,18 @@ class FinalGather:
         frame = np.stack([*orthonormal_basis(normals), normals], axis=1).astype(np.float32)
         return np.asarray(local @ frame)
 
-    def _found(self, hits: Hits, directions: Array) -> Array:
-        """Return (h,) int32 the numbers of what rays met, the sky where they met nothing."""
-        found = self._resolve(hits)
+    def _found(self, hits: Hits, directions: Array, upright: Array) -> Array:
+        """Return (h,) int32 the numbers of what rays met, the sky where they met nothing.
+
+        upright (h, 3): Normals of the surfaces that the rays start on.
+        """
         missed = np.flatnonzero(hits.triangle < 0)
+        back = np.flatnonzero(~hits.front & (hits.triangle >= 0))
+        height = hits.distance[back] * np.einsum("hk,hk->h", directions[back], upright[back])
+        answered = np.ones(len(directions), dtype=bool)
+        answered[back[height < PRESSED * self._caster.surface_offset]] = False
+        found = np.full(len(directions), NOTHING, dtype=np.int32)
+        found[answered] = self._resolve(hits.take(answered))
         found[missed] = sky_numbers(self._sky, directions[missed])
         return found
 
