@@ -44,11 +44,11 @@ class LightmapImport:
         self, gltf_material: Any, _vertex_color: Any, material: bpy.types.Material, gltf: Any
     ) -> None:
         """Show the lightmap that a material names."""
-        told = (gltf_material.extras or {}).get("lightmap")
-        if _suspended or not isinstance(told, dict) or material is None:
+        named = (gltf_material.extras or {}).get("lightmap")
+        if _suspended or not isinstance(named, dict) or material is None:
             return
-        file = told.get("file")
-        if not isinstance(file, str) or Path(file).name != file or told.get("texCoord") != 1:
+        file = named.get("file")
+        if not isinstance(file, str) or Path(file).name != file or named.get("texCoord") != 1:
             return
         path = Path(gltf.filename).parent / file
         if path not in self._images:

@@ -26,7 +26,7 @@ point's n, a cell of r rays would add m² / (n r) of the point's own variance to
 RAYS_PER_SHADOW_RAY = 4
 """Gather rays of a cell for each shadow ray to a lamp."""
 
-ROUNDS = 6
+ROUNDS = 16
 """Rounds of asking the cells that cells met, at most: each finds about half as many new ones, which count
 less and less. What is met in the last has the hierarchy's value."""
 
