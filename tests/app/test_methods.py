@@ -105,11 +105,14 @@ def test_the_plot_is_drawn_where_requested_and_named(run: Run, small_room: Path,
 
 
 def test_separate_rooms_are_blocks_named_by_their_objects(run: Run, tmp_path: Path) -> None:
-    """Two closed boxes: the inside of each, and the outsides, which see each other."""
+    """Two closed boxes with a lamp in each: the inside of each, and the outsides, which see each other."""
     for name, x in (("Left Room", 0.0), ("Right Room", 4.0)):
         bpy.ops.mesh.primitive_cube_add(size=2, location=(x, 0, 0))
         bpy.context.object.name = name
     add_lamp()  # above both, out of doors
+    for x in (0.0, 4.0):
+        add_lamp()
+        bpy.context.scene.objects[-1].location = (x, 0, 0)
     scene = save_small(tmp_path / "rooms.blend")
     words = ("--method", "gauss-seidel", "--elements", "100")
     assert run("bake", scene, "--output", tmp_path / "out", *TINY, *words).code == 0

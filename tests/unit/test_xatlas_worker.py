@@ -104,7 +104,7 @@ def test_canceled_while_a_process_works_nothing_is_left_of_it(monkeypatch: pytes
         if started:
             raise Cancelled
 
-    monkeypatch.setattr(xatlas_worker, "_started", deaf)
+    monkeypatch.setattr(xatlas_worker, "start_process", deaf)
     triangles, polygon = uv_sphere(6, 8)
     with growers.PatientGrower(60.0, 10**6, threads=2) as grower, pytest.raises(Cancelled):
         unwrap(triangles, polygon, grower, Progress(cancel), threads=2, abort=grower.close)

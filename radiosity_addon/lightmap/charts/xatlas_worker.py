@@ -93,7 +93,7 @@ class XatlasProcess:
             with self._lock:
                 if self._closed:
                     return None
-                process = self._process = self._process or _started()
+                process = self._process = self._process or start_process()
             timer = threading.Timer(TIMEOUT, process.kill)
             timer.daemon = True
             timer.start()
@@ -124,7 +124,7 @@ class XatlasProcess:
                     pipe.close()
 
 
-def _started() -> subprocess.Popen[bytes]:
+def start_process() -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [sys.executable, str(Path(__file__))],
         stdin=subprocess.PIPE,
