@@ -1,7 +1,7 @@
 """Estimates of a bake before it begins: pages, texels, memory and time, by rule of thumb.
 
 Nothing is unwrapped and no ray is traced. The rules were fitted to the Cornell box, the office and rooms of
-a thousand to a million triangles (bench/results), two cores; tests hold them to a factor of 2.5 there.
+a thousand to a million triangles (bench/results), two cores; tests hold them to a factor of 1.5 there.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ close together has small charts, and texels next to others are divided."""
 RAYS = {"draft": 0.55, "medium": 1.0, "high": 2.2}
 """Times as many rays."""
 
-SECONDS_A_RAY = 0.75e-6
+SECONDS_A_RAY = 0.9e-6
 """On two cores, with all that is done with what a ray meets."""
 
 SOLVE_SECONDS = {"draft": 0.065, "medium": 0.1, "high": 0.25}
@@ -54,7 +54,7 @@ CORES = 2
 KEPT_RAYS = {"draft": 0.7, "medium": 1.0, "high": 1.6}
 """Times as many rays of which is kept what they met, …"""
 
-BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 140.0, 380.0, 40.0, 30e6
+BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 20.0, 380.0, 40.0, 30e6
 """… memory of texels, which is in files beyond the memory limit: what a ray met is kept while light is swept,
 more of it in small charts, as with rays; where texels lie, and their light; the pages."""
 
