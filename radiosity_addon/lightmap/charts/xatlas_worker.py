@@ -125,6 +125,7 @@ class XatlasProcess:
 
 
 def start_process() -> subprocess.Popen[bytes]:
+    """Start a worker that reads charts to cut from its input."""
     return subprocess.Popen(
         [sys.executable, str(Path(__file__))],
         stdin=subprocess.PIPE,
