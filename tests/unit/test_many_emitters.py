@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.numerics import double_area_vectors
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver.emitters import emitters
+from radiosity_addon.solver.emitters.direction_table import DirectionTable
 from radiosity_addon.solver.emitters.emitter_tree import EmitterTree
 from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.emitters.merged_faces import merge_flat
@@ -174,3 +176,72 @@ def test_points_behind_every_face_get_no_weight(monkeypatch: pytest.MonkeyPatch)
     _, _, weights = lamp.shadow_rays(points, normals, stratified_square(np.arange(2), 16, 1))
     assert not weights[0].any()
     assert weights[1].mean() == pytest.approx(1.0, abs=1e-9)
+
+
+def bulbs(count: int, radius: float = 0.04) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles of bulbs in a room, and (count, 3) their centers."""
+    random = np.random.default_rng(3)
+    centers = random.uniform((0.0, 0.0, 0.7), (8.0, 6.0, 2.2), size=(count, 3))
+    one = sphere(2)[:, [0, 2, 1]] * radius
+    return (one + centers[:, None, None]).reshape(-1, 3, 3), centers
+
+
+def around(centers: np.ndarray, count: int, apart: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return points in the room of bulbs, no nearer to any than `apart`, and directions."""
+    random = np.random.default_rng(5)
+    points = random.uniform((0.0, 0.0, 0.0), (8.0, 6.0, 3.0), size=(count, 3))
+    normals = random.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    kept = np.linalg.norm(points[:, None] - centers, axis=2).min(axis=1) > apart
+    return points[kept], normals[kept]
+
+
+def test_far_bulbs_are_one_lamp_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles, centers = bulbs(8)
+    points, normals = around(centers, 1000, 10.5 * 0.04)
+    found = group(triangles, 64, monkeypatch).unit_irradiance(points, normals)
+    expected = group(triangles, 10**9, monkeypatch).unit_irradiance(points, normals)
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.003 * expected.mean()
+    assert found.sum() == pytest.approx(expected.sum(), rel=0.001)
+    tree = EmitterTree(triangles, normals_of(triangles), np.ones(len(triangles)))
+    assert len(tree.ask(points, normals).row) < 8 * len(points)
+
+
+def test_rays_to_far_bulbs_are_shared_by_what_they_send(monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles, centers = bulbs(8)
+    points, normals = around(centers, 200, 10.5 * 0.04)
+    factors = group(triangles, 10**9, monkeypatch).factors(points, normals)
+    lit = factors.sum(axis=1) > 0.1 * factors.sum(axis=1).mean()
+    points, normals, factors = points[lit], normals[lit], factors[lit]
+    hidden = triangles.mean(axis=1)[:, 0] > 4.0
+    expected = factors[:, hidden].sum(axis=1) / factors.sum(axis=1)
+    u = stratified_square(np.arange(len(points)), 256, 5)
+    directions, distances, weights = group(triangles, 64, monkeypatch).shadow_rays(points, normals, u)
+    ends = points[:, None] + directions * distances[..., None]
+    share = (weights * (ends[..., 0] > 4.0)).sum(axis=1) / weights.sum(axis=1)
+    assert np.abs(share - expected).mean() < 0.01
+    # On the near side of a bulb, where light leaves it: few rays are wasted on its back.
+    nearest = np.linalg.norm(ends[:, :, None] - centers, axis=3).argmin(axis=2)
+    outward = np.einsum("nkc,nkc->nk", ends - centers[nearest], directions)
+    assert (outward < 0).mean() > 0.9
+
+
+def test_a_sphere_far_away_sends_by_its_solid_angle() -> None:
+    """Of an exact sphere F = (r / d)² cos θ; this one's triangles have as much area as shows of them."""
+    triangles = sphere(4)[:, [0, 2, 1]] * 0.1
+    twice = np.linalg.norm(double_area_vectors(triangles), axis=1)
+    table = DirectionTable(
+        triangles.mean(axis=1),
+        normals_of(triangles),
+        0.5 * twice,
+        np.zeros((1, 3)),
+        np.array([0]),
+        np.array([len(triangles)]),
+    )
+    points, normals = around(np.zeros((1, 3)), 500, 1.0)
+    distance = np.linalg.norm(points, axis=1)
+    rise = -np.einsum("nk,nk->n", points, normals)
+    up = rise > 0.1
+    found = table.factors(np.zeros(up.sum(), dtype=int), points[up], normals[up], rise[up], distance[up])
+    shown = twice.sum() / 8.0
+    np.testing.assert_allclose(found, shown * rise[up] / (np.pi * distance[up] ** 3), rtol=0.005)

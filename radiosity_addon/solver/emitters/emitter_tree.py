@@ -4,7 +4,8 @@ A bulb of ten thousand triangles cannot be evaluated triangle by triangle at eve
 groups the faces by position and orientation; each point descends it until a group is small for its
 distance and faces one way (Walter et al., Lightcuts: a scalable approach to illumination, 2005).
 Such a group sends like the rectangle that has its area vector, its centroid and its second moments;
-single faces are evaluated exactly. Which groups a point uses depends on the point alone.
+single faces are evaluated exactly. Groups that face many ways, as bulbs do, send from afar what a table of
+directions says (`direction_table.py`). Which groups a point uses depends on the point alone.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from ...form_factors import point_to_polygon
 from ...numerics import Array, running_sums, triangle_areas
+from .direction_table import DirectionTable
 
 NEAREST = 3.0
 """A flat group is evaluated as one from this many times its radius on, …"""
@@ -30,6 +32,16 @@ FAR = 10.0
 
 FLAT_SINE = 1e-5
 """Sine of the angle to the farthest normal of a flat group."""
+
+TURN = 0.25
+"""A group's normals count like places that are apart by this part of its extent: bulbs are told apart
+before their sides are."""
+
+LEAST_SENT = 1e-3
+"""A group is chosen as if it sent this part of its area at least: that it sends none is an estimate."""
+
+MOST_TABLES = 512
+"""Groups that have a table of directions at most, the largest first: 12 kB each."""
 
 THINNEST = 1e-3
 """A rectangle's shorter side, as a part of its longer one, at least."""
@@ -105,6 +117,12 @@ class EmitterTree:
         self.radius, self._slant = self._extremes(corners, normals)
         flat, coherent = self._slant <= FLAT_SINE, self._slant <= MOST_SLANT
         self._smallness = np.where(flat, 1.0 / NEAREST, np.where(coherent, 1.0 / CURVED, 0.0))
+        turning = np.flatnonzero(~coherent & (self.end - self.begin > 1))[:MOST_TABLES]
+        self._tables = DirectionTable(
+            centroid + origin, normals, weight, self.center[turning], self.begin[turning], self.end[turning]
+        )
+        self._table = np.full(len(self.begin), -1)
+        self._table[turning] = np.arange(len(turning))
 
     def _sums(self, values: Array) -> Array:
         """Return (k, …) the sums over every node's faces of (m, …)."""
@@ -141,7 +159,8 @@ class EmitterTree:
             single = self._single.take(node)
             whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
             settled = single | (whole & (radius <= self._smallness.take(node) * distance))
-            simple = seen & settled & (distance > FAR * radius) & (height < -radius)
+            far = seen & (distance > FAR * radius) & (height < -radius)
+            simple = far & settled
             done = np.flatnonzero(simple)
             rows.append(row[done])
             nodes.append(node[done])
@@ -150,7 +169,17 @@ class EmitterTree:
             rows.append(row[done])
             nodes.append(node[done])
             factors.append(self._closed(points, normals, row[done], node[done]))
-            more = np.flatnonzero(seen & ~settled)
+            tabled = far & ~settled & (self._table.take(node) >= 0)
+            done = np.flatnonzero(tabled)
+            rows.append(row[done])
+            nodes.append(node[done])
+            facing = normals.take(row[done], axis=0)
+            factors.append(
+                self._tables.factors(
+                    self._table[node[done]], along[done], facing, -height[done], distance[done]
+                )
+            )
+            more = np.flatnonzero(seen & ~settled & ~tabled)
             child = self._child.take(node[more])
             row = np.repeat(row[more], 2)
             node = np.stack([child, child + 1], axis=1).ravel()
@@ -158,6 +187,41 @@ class EmitterTree:
         lit = np.flatnonzero(factor > 0)
         lit = lit[np.argsort(row[lit], kind="stable")]
         return EmitterPairs(row[lit], node[lit], factor[lit])
+
+    def descend(self, points: Array, node: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Choose below nodes that send by a table one that does not, in proportion to what it sends.
+
+        points (p, 3), node (p,), u (p,): The last is in [0, 1), and used up in part.
+        Returns node (p,), u (p,), and the probability of the choice (p,).
+        """
+        node, u, chance = node.copy(), u.copy(), np.ones(len(node))
+        rows = np.flatnonzero(self._table[node] >= 0)
+        while len(rows):
+            along = points[rows] - self.center[node[rows]]
+            along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+            first = self._child[node[rows]]
+            one, other = (self._sent(first + step, along) for step in (0, 1))
+            split = one / (one + other)
+            right = u[rows] >= split
+            part = np.where(right, 1.0 - split, split)
+            u[rows] = np.clip((u[rows] - np.where(right, split, 0.0)) / part, 0.0, 1.0 - 1e-12)
+            chance[rows] *= part
+            node[rows] = first + right
+            rows = rows[self._table[node[rows]] >= 0]
+        return node, u, chance
+
+    def _sent(self, node: Array, along: Array) -> Array:
+        """Return (p,) about what nodes send along unit directions (p, 3): their visible areas [m²]."""
+        weight = self.running[self.end[node]] - self.running[self.begin[node]]
+        front = np.einsum("pk,pk->p", along, self.facing[node])
+        sent = self._vector[node] * np.maximum(front, 0.0)
+        # Few faces that face many ways.
+        many = self._slant[node] > MOST_SLANT
+        sent[many] = 0.25 * weight[many]
+        table = self._table[node]
+        known = np.flatnonzero(table >= 0)
+        sent[known] = self._tables.area(table[known], along[known])
+        return np.asarray(sent + LEAST_SENT * weight + np.where(weight > 0.0, 1e-300, 0.0))
 
     def _closed(self, points: Array, normals: Array, row: Array, node: Array) -> Array:
         """Return (p,) what points get from nodes in closed form."""
@@ -179,8 +243,7 @@ def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:
     Returns levels list of (2^l + 1,) int: Where the runs of each level begin, and the last one ends; the last
         level's hold one face each, or none.
     """
-    size = 0.5 * np.linalg.norm(np.ptp(places, axis=0))
-    keys = np.concatenate([places, 0.5 * size * normals], axis=1)
+    keys = np.concatenate([places, normals], axis=1)
     count = len(places)
     order, bounds = np.arange(count), np.array([0, count])
     levels = [bounds]
@@ -191,7 +254,9 @@ def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:
         low = np.minimum.reduceat(sorted_keys, bounds[held], axis=0)
         high = np.maximum.reduceat(sorted_keys, bounds[held], axis=0)
         widest = np.zeros(len(bounds) - 1, dtype=np.int64)
-        widest[held] = (high - low).argmax(axis=1)
+        extent = high - low
+        extent[:, 3:] *= TURN * np.linalg.norm(extent[:, :3], axis=1, keepdims=True)
+        widest[held] = extent.argmax(axis=1)
         along = np.take_along_axis(sorted_keys, widest[run][:, None], axis=1)[:, 0]
         order = order[np.lexsort((along, run))]
         middle = (bounds[:-1] + bounds[1:] + 1) // 2

@@ -206,7 +206,9 @@ class EmitterGroup:
         first = run_starts(count)[lit, None]
         running = running_sums(pairs.factor)
         which, along = pick_in_runs(running, u[lit, :, 0], first, first + count[lit, None])
-        node = pairs.node[which]
+        toward = np.repeat(points[lit], u.shape[1], axis=0)
+        node, along, chance = tree.descend(toward, pairs.node[which].ravel(), along.ravel())
+        node, along, chance = (each.reshape(which.shape) for each in (node, along, chance))
         begin, end = tree.begin[node], tree.end[node]
         slot, along = pick_in_runs(tree.running, along, begin, end)
         inside = np.stack([along, u[lit, :, 1]], axis=-1)
@@ -214,7 +216,7 @@ class EmitterGroup:
             points[lit], normals[lit], tree.order[slot], inside
         )
         # A point of a node's faces stands for what the whole node would send, were it all there.
-        sent = radiance_of_radiosity(thrown * (tree.running[end] - tree.running[begin]))
+        sent = radiance_of_radiosity(thrown * (tree.running[end] - tree.running[begin]) / chance)
         weights[lit] = _balanced(sent / np.maximum(pairs.factor[which], 1e-300), which, len(pairs.row))
         return directions, distances, weights
 
