@@ -77,7 +77,8 @@ class BakePlan:
     digests: What is to be remembered of the bake.
     kept: The bake to update, if *moved*.
     unchanged collection of str: The objects that keep their lightmaps.
-    gone: Objects that the last bake had, if *changed* or *nothing*.
+    gone, altered: Objects that the last bake had, and those without a lightmap that changed since or are new, if
+        *changed* or *nothing*.
     """
 
     kind: Literal["full", "changed", "moved", "nothing"]
@@ -87,12 +88,13 @@ class BakePlan:
     kept: KeptBake | None = None
     unchanged: Collection[str] = ()
     gone: Sequence[str] = ()
+    altered: Sequence[str] = ()
 
     @property
     def reason(self) -> str:
         """Why nothing is to be done."""
-        if self.gone:
-            return f"no object has changed that gets a lightmap, but {self._gone}"
+        if self._ignored:
+            return f"no object has changed that gets a lightmap, but {self._ignored}"
         return "nothing has changed since the last bake: there is nothing to do"
 
     @property
@@ -104,13 +106,17 @@ class BakePlan:
             f"{len(self.unchanged)} unchanged objects kept their lightmaps, without the new light and shadow "
             "of the changed ones; bake all to update them"
         )
-        return (BakeWarning("scene", f"{message}; {self._gone}" if self.gone else message),)
+        return (BakeWarning("scene", f"{message}; {self._ignored}" if self._ignored else message),)
 
     @property
-    def _gone(self) -> str:
-        named = ", ".join(f"'{name}'" for name in self.gone[:_NAMED])
-        more = f" and {len(self.gone) - _NAMED} more" if len(self.gone) > _NAMED else ""
-        return f"removed since the last bake: {named}{more}; their light and shadow stay until you bake all"
+    def _ignored(self) -> str:
+        """What else differs from the last bake, "" for nothing."""
+        parts = []
+        for what, names in (("removed", self.gone), ("changed", self.altered)):
+            named = ", ".join(f"'{name}'" for name in names[:_NAMED])
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            parts += [f"{what} since the last bake: {named}{more}"] if names else []
+        return f"{'; '.join(parts)}; their light and shadow stay until you bake all" if parts else ""
 
 
 def plan_bake(
@@ -135,9 +141,9 @@ def plan_bake(
     }
     if not same or any(lightmap.has_groups for lightmap in same.values()):
         return full
-    gone = _gone(shown, digests)
+    gone, altered = _gone(shown, digests), _altered(shown, digests, baked)
     if len(same) == len(baked):
-        return BakePlan("nothing", bake_scene, settings, digests, unchanged=same.keys(), gone=gone)
+        return BakePlan("nothing", bake_scene, settings, digests, None, same.keys(), gone, altered)
     objects = tuple(replace(item, bake=item.bake and item.name not in same) for item in bake_scene.objects)
     if settings.atlas == "shared" and settings.texel_density is None:
         # As sharp as in a bake of all, on a page of their own.
@@ -148,7 +154,7 @@ def plan_bake(
         density = float(np.median([lightmap.density for lightmap in same.values()]))
         settings = replace(settings, texel_density=density, pages=1)
     changed = replace(bake_scene, objects=objects)
-    return BakePlan("changed", changed, settings, digests, unchanged=same.keys(), gone=gone)
+    return BakePlan("changed", changed, settings, digests, None, same.keys(), gone, altered)
 
 
 def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
@@ -190,4 +196,14 @@ def _gone(shown: ShownBake, digests: BakeDigests) -> list[str]:
     present = {digest[:SHORT] for digest in digests.objects.values()}
     return [
         name for name in shown.objects if name not in digests.objects and shown.objects[name] not in present
+    ]
+
+
+def _altered(shown: ShownBake, digests: BakeDigests, baked: Collection[str]) -> list[str]:
+    """Return the objects without a lightmap that are not as in the last bake, except for renamed ones."""
+    before = set(shown.objects.values())
+    return [
+        name
+        for name, digest in digests.objects.items()
+        if before and name not in baked and digest[:SHORT] not in before
     ]

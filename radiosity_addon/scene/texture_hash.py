@@ -98,10 +98,9 @@ def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]
     Triangles come in groups of one size in texels, and in their order; the texels of each by their weights.
     """
     rows = rows[images.textured[rows]]
-    texel_values = images.values
-    if images.passes is not None:
-        texel_values = np.concatenate([texel_values, images.passes], axis=2)
-    height, width = texel_values.shape[:2]
+    # Whole images are not joined: every object asks for its part of them.
+    layers = [images.values] if images.passes is None else [images.values, images.passes]
+    height, width = images.values.shape[:2]
     corners = images.image_uv[rows].astype(np.float64) * (width, height) - 0.5
     low = np.rint(np.floor(corners.min(axis=1) + 1e-3)).astype(np.int64)
     size = np.rint(np.ceil(corners.max(axis=1) - 1e-3)).astype(np.int64) - low + 1
@@ -118,7 +117,9 @@ def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]
             inside = np.take_along_axis(inside, order, axis=1)
             count = inside.sum(axis=1)
             if count.any():
-                yield texel_values.reshape(-1, texel_values.shape[2])[pixel[inside]], count
+                wanted = pixel[inside]
+                found = [layer.reshape(-1, layer.shape[2])[wanted] for layer in layers]
+                yield np.concatenate(found, axis=1), count
 
 
 def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:

@@ -161,10 +161,13 @@ def test_glass_colored_by_an_image_is_evaluated_by_channel() -> None:
     np.testing.assert_allclose(left[0], (1, 0.5, 0.25), atol=1e-3)
 
 
+@pytest.mark.usefixtures("registered")
 def test_nothing_but_glass_is_refused_by_name() -> None:
     add_mesh("Pane", SQUARE, material=shader_material("Pane", "ShaderNodeBsdfGlass"))
-    with pytest.raises(SceneError, match=r"Pane.*glass"):
+    with pytest.raises(SceneError, match=r"Pane.*glass") as raised:
         export_scene(bpy.context, BakeSettings(resolution=16))
+    found = inspect(bpy.context, BakeSettings(resolution=16), None)
+    assert [each.message for each in found.findings if each.level == "ERROR"] == [str(raised.value)]
 
 
 @pytest.mark.usefixtures("registered")

@@ -109,6 +109,17 @@ def test_nothing_is_planned_where_nothing_changed() -> None:
     assert "'Shelf'" in plan.reason
 
 
+def test_changes_of_what_has_no_lightmap_are_named() -> None:
+    remembered = shown()
+    del remembered.lightmaps["Box"]  # type: ignore[attr-defined]
+    painted = with_arrays(reflectance=lambda old: 0.5 * old)
+    for scene, altered in ((lit_bake(), []), (painted, ["Box"])):
+        objects = [replace(item, bake=item.name != "Box") for item in scene.objects]
+        plan = plan_bake(replace(scene, objects=tuple(objects)), SETTINGS, remembered, None)
+        assert (plan.kind, plan.altered) == ("nothing", altered)
+        assert ("'Box'" in plan.reason) == bool(altered)
+
+
 @pytest.mark.parametrize(
     ("scene", "settings", "remembered"),
     [

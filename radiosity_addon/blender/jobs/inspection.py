@@ -33,7 +33,7 @@ from ..apply.rebake import originals_shown
 from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
-from ..scene_export.export import check_names, chosen_pieces
+from ..scene_export.export import all_glass, check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
@@ -145,6 +145,8 @@ def inspect(
         findings.append(Finding(ERROR, context.scene.name, str(error)))
     shapes = {id(piece): piece_shape(piece) for piece in collected.pieces if len(piece.mesh)}
     lit = lit_objects(chosen, shapes, collected, settings.keep_uvs)
+    if chosen and not lit:
+        findings.append(Finding(ERROR, chosen[0].source.name, all_glass(chosen[0].source.name)))
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     faces = lit_sides(collected.pieces, collected)
     plan = estimate_bake(lit, triangles, settings, faces)
@@ -263,7 +265,7 @@ def _of_layers(chosen: Sequence[Piece], settings: BakeSettings) -> Iterator[Find
         )
     without = [piece.source.name for piece in chosen if piece.uv_layers == 0]
     if without:
-        message = f"{_names(without)} without UVs of their own: '{LIGHTMAP_UV_LAYER}' becomes the first layer"
+        message = f"{_names(without)} without UVs: '{LIGHTMAP_UV_LAYER}' becomes the first layer"
         yield Finding(INFO, without[0], message)
     if settings.keep_uvs:
         new = [piece.source.name for piece in chosen if not piece.has_lightmap_layer]

@@ -204,9 +204,7 @@ def _export(
     objects, sources = _without_glass(triangles.objects, collected.pieces, images)
     if not any(item.bake and item.count for item in objects):
         name = next(item.name for item in triangles.objects if item.bake and item.count)
-        raise SceneError(
-            f"object '{name}' is glass, as all that is to be baked, and gets no lightmap: bake other objects"
-        )
+        raise SceneError(all_glass(name))
     for piece, obj in zip(collected.pieces, triangles.objects, strict=True):
         if piece.linking and scene.emission[obj.rows].any():
             warnings += piece.linking
@@ -357,6 +355,11 @@ def _check_uv_layers(piece: Piece) -> None:
 def _degenerate_warning(name: str, count: int) -> BakeWarning:
     which = "a triangle" if count == 1 else f"{count} triangles"
     return BakeWarning(name, f"object '{name}': {which} without area; no light falls there")
+
+
+def all_glass(name: str) -> str:
+    """Return the error for a bake of nothing but glass, of which `name` is some."""
+    return f"nothing to bake: '{name}' and all else that is selected is glass, which gets no lightmap"
 
 
 def _no_light(name: str) -> BakeWarning:
