@@ -77,8 +77,8 @@ class BakePlan:
     digests: What is to be remembered of the bake.
     kept: The bake to update, if *moved*.
     unchanged collection of str: The objects that keep their lightmaps.
-    gone, altered: Objects that the last bake had, and those without a lightmap that changed since or are new, if
-        *changed* or *nothing*.
+    gone, altered: Objects that the last bake had and the scene has not, and objects without a lightmap that
+        changed since, if *changed* or *nothing*.
     """
 
     kind: Literal["full", "changed", "moved", "nothing"]
