@@ -33,29 +33,35 @@ MOST_GAPS = 0.12
 what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
 utilization and texels per meter are right within 10 % there."""
 
-RAYS_A_TEXEL, RAYS_AT_EDGES = 40.0, 5200.0
+RAYS_A_TEXEL, RAYS_AT_EDGES = 25.0, 5200.0
 """Rays for each texel at medium quality: of charts of n texels the first and the second / √n. What stands
 close together has small charts, and texels next to others are divided."""
 
-RAYS = {"draft": 0.55, "medium": 1.0, "high": 2.2}
+MOST_AT_EDGES = 900.0
+"""All texels are next to others where charts are small; more rays than these none of them takes."""
+
+RAYS = {"sketch": 0.35, "draft": 0.55, "medium": 1.0, "high": 2.2}
 """Times as many rays."""
 
 SECONDS_A_RAY = 0.9e-6
 """On two cores, with all that is done with what a ray meets."""
 
-SOLVE_SECONDS = {"draft": 0.065, "medium": 0.1, "high": 0.25}
+SOLVE_SECONDS = {"sketch": 0.055, "draft": 0.08, "medium": 0.12, "high": 0.3}
 """Time to solve a scene of one triangle; others by the number of triangles to the power 0.45."""
 
-UNWRAP_SECONDS, KEPT_SECONDS = 20e-6, 3e-6
+UNWRAP_SECONDS, KEPT_SECONDS = 25e-6, 3e-6
 """A triangle's time to be unwrapped, and if its layout is kept."""
 
-RASTERIZE_SECONDS, ENCODE_SECONDS = 10e-6, 1.5e-6
-"""A texel's time to be found on the page, and to be put there, with its seams."""
+FIND_SECONDS, FIND_KEPT_SECONDS, FIND_TEXEL_SECONDS = 15e-6, 3e-6, 7e-6
+"""The same to be found again on the page, and each texel's."""
+
+ENCODE_SECONDS, REPORT_SECONDS = 1.5e-6, 3e-6
+"""A texel's time to be put on its page, with its seams, and a triangle's to be reported on."""
 
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-KEPT_RAYS = {"draft": 0.7, "medium": 1.0, "high": 1.6}
+KEPT_RAYS = {"sketch": 0.5, "draft": 0.7, "medium": 1.0, "high": 1.6}
 """Times as many rays of which is kept what they met, …"""
 
 BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 20.0, 380.0, 40.0, 30e6
@@ -151,7 +157,7 @@ def estimate_bake(
     pages, texels = _pages(objects, settings)
     total = sum(texels)
     crowded = math.sqrt(sum(item.charts for item in objects) / max(total, 1.0))
-    rays = total * (RAYS_A_TEXEL + RAYS_AT_EDGES * crowded)
+    rays = total * (RAYS_A_TEXEL + min(RAYS_AT_EDGES * crowded, MOST_AT_EDGES))
     of_texels = (
         BYTES_AT_LEAST
         + (BYTES_A_RAY + BYTES_AT_EDGES * crowded) * KEPT_RAYS[settings.quality] * rays
@@ -204,10 +210,10 @@ def _stages(triangles: int, kept: int, texels: float, rays: float, settings: Bak
     parallel = (CORES / thread_count(settings.threads)) ** 0.6
     return StageSeconds(
         unwrap=UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept,
-        rasterize=RASTERIZE_SECONDS * texels,
+        rasterize=FIND_SECONDS * (triangles - kept) + FIND_KEPT_SECONDS * kept + FIND_TEXEL_SECONDS * texels,
         solve=parallel * SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45,
         light=parallel * SECONDS_A_RAY * RAYS[settings.quality] * rays,
-        encode=ENCODE_SECONDS * texels,
+        encode=ENCODE_SECONDS * texels + REPORT_SECONDS * triangles,
     )
 
 

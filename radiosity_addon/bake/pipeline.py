@@ -150,6 +150,7 @@ def _bake(
         part = lighting.stage("light", 0.0, 1.0, look)
         lit = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far, part)
         del so_far, look, part
+    encoding.stage("encode", 0.0, 0.0).at(0.0)
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     glass = [item.name for item in bake_scene.objects if item.glass is not None]
     report |= {"glass": glass} if glass else {}

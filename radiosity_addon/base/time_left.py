@@ -19,11 +19,11 @@ RECENT = 0.35
 SLOWEST = 0.5
 """… but no less than this share of the mean pace: a step that makes no progress will end."""
 
-TRUSTED = 0.05
-"""What was expected beforehand counts as much as this part of the whole at the expected pace: a first short
-step that takes many times as long as expected says little of the others."""
+TRUSTED = 0.04
+"""What is expected beforehand counts as much as this part of the whole at the expected pace, so that a first
+short step that takes many times as long says little of the others. No estimate before so much is done."""
 
-SHORTEST_MEMORY, MEMORY = 0.7, 0.08
+SHORTEST_MEMORY, MEMORY = 0.7, 0.05
 """The shown time follows a new estimate within this many seconds, or this share of it."""
 
 READING_INTERVAL = 0.05
@@ -68,12 +68,14 @@ class RemainingTime:
             self._shown = estimate
         return self._shown
 
-    def _by_expectation(self, now: float, expected: Expected) -> float:
-        """Return what is left at the pace of what was done since something was expected."""
+    def _by_expectation(self, now: float, expected: Expected) -> float | None:
+        """Return what is left at the pace of what was done since something was expected; None at first."""
         if self._expecting is None:
             self._expecting = now, expected.done
         start, before = self._expecting
         trusted = TRUSTED * (expected.done + expected.left)
+        if expected.done - before < trusted:
+            return None
         slower = (now - start + trusted) / max(expected.done - before + trusted, 1e-9)
         return slower * expected.left
 

@@ -143,13 +143,13 @@ def gather_sub_cells(
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     gathering.take_known()
-    for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.7).turns(0.5), strict=False):
+    for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.5).turns(0.5), strict=False):
         if not gathering.gather_new(turn):
             break
         gathering.take_known()
     small = gathering.small()
     rows = TableRows(table.first_small, small)
-    made = gathering.links(rows, reflectance, progress.part(0.7, 1.0))
+    made = gathering.links(rows, reflectance, progress.part(0.5, 1.0))
     for sources in (links.sources, links.aimed.sources):
         rows.to_rows(sources)
     number = np.concatenate([np.arange(table.texel_count, table.first_small), small])
