@@ -53,7 +53,7 @@ def execute(path: Path) -> None:
 
 
 def test_there_are_four_presets_and_blender_finds_them() -> None:
-    assert [path.stem for path in PRESETS] == ["Draft", "Exterior", "Final", "Interior"]
+    assert [path.stem for path in PRESETS] == ["Draft", "Exterior", "Final", "Interior", "Sketch"]
     assert str(PRESETS[0].parent) in bpy.utils.preset_paths(FOLDER)
 
 
