@@ -23,14 +23,14 @@ QUALITY_SETTINGS = {
     "sketch": Quality(
         SolverSettings(
             shadow_rays=2,
-            error=3e-3,
-            min_area=3e-4,
+            error=1e-2,
+            min_area=1e-3,
             form_factor_error=0.05,
             elements=250,
             patches=50,
             contrast=0.4,
         ),
-        GatherSettings(strides=(4, 2, 1), support=0.1, rays=64, tolerance=2e-3),
+        GatherSettings(strides=(4, 2, 1), support=0.1, rays=48, tolerance=3e-3, cell_rays=4),
     ),
     "draft": Quality(
         SolverSettings(

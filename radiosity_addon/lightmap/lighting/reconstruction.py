@@ -171,7 +171,7 @@ def _trace(
     if standing is not None:
         known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)
-    cells, rows = gather_sub_cells(table, links, element, reflectance, known, parts)
+    cells, rows = gather_sub_cells(table, links, element, reflectance, settings.cell_rays, known, parts)
     return TexelTransport(links, cells, reflectance), layout, rows
 
 
