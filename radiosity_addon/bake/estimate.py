@@ -56,7 +56,7 @@ FIND_SECONDS, FIND_KEPT_SECONDS, FIND_TEXEL_SECONDS = 15e-6, 3e-6, 7e-6
 """The same to be found again on the page, and each texel's."""
 
 ENCODE_SECONDS, REPORT_SECONDS = 1.5e-6, 20e-6
-"""A texel's time to be put on its page, with its seams, and that of an unwrapped triangle to be reported on."""
+"""A texel's time to be put on its page, with its seams, and an unwrapped triangle's to be reported on."""
 
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""

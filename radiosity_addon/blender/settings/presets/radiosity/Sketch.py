@@ -1,4 +1,4 @@
-"""To place lamps: the fastest light that is smooth."""
+"""To place lamps: the fastest light."""
 
 import bpy
 
