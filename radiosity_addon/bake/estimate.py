@@ -37,7 +37,7 @@ RAYS_A_TEXEL, RAYS_AT_EDGES = 25.0, 5200.0
 """Rays for each texel at medium quality: of charts of n texels the first and the second / √n. What stands
 close together has small charts, and texels next to others are divided."""
 
-MOST_AT_EDGES = 900.0
+MOST_AT_EDGES = 700.0
 """All texels are next to others where charts are small; more rays than these none of them takes."""
 
 RAYS = {"sketch": 0.35, "draft": 0.55, "medium": 1.0, "high": 2.2}
