@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,26 +33,35 @@ MOST_GAPS = 0.12
 what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
 utilization and texels per meter are right within 10 % there."""
 
-RAYS_A_TEXEL, RAYS_AT_EDGES = 40.0, 5200.0
+RAYS_A_TEXEL, RAYS_AT_EDGES = 25.0, 5200.0
 """Rays for each texel at medium quality: of charts of n texels the first and the second / √n. What stands
 close together has small charts, and texels next to others are divided."""
 
-RAYS = {"draft": 0.55, "medium": 1.0, "high": 2.2}
+MOST_AT_EDGES = 700.0
+"""All texels are next to others where charts are small; more rays than these none of them takes."""
+
+RAYS = {"sketch": 0.35, "draft": 0.55, "medium": 1.0, "high": 2.2}
 """Times as many rays."""
 
 SECONDS_A_RAY = 0.9e-6
 """On two cores, with all that is done with what a ray meets."""
 
-SOLVE_SECONDS = {"draft": 0.065, "medium": 0.1, "high": 0.25}
+SOLVE_SECONDS = {"sketch": 0.055, "draft": 0.08, "medium": 0.12, "high": 0.3}
 """Time to solve a scene of one triangle; others by the number of triangles to the power 0.45."""
 
-UNWRAP_SECONDS, KEPT_SECONDS = 60e-6, 13e-6
-"""A triangle's time to be unwrapped and found again on the page, and if its layout is kept."""
+UNWRAP_SECONDS, KEPT_SECONDS = 25e-6, 3e-6
+"""A triangle's time to be unwrapped, and if its layout is kept."""
+
+FIND_SECONDS, FIND_KEPT_SECONDS, FIND_TEXEL_SECONDS = 15e-6, 3e-6, 7e-6
+"""The same to be found again on the page, and each texel's."""
+
+ENCODE_SECONDS, REPORT_SECONDS = 1.5e-6, 20e-6
+"""A texel's time to be put on its page, with its seams, and an unwrapped triangle's to be reported on."""
 
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-KEPT_RAYS = {"draft": 0.7, "medium": 1.0, "high": 1.6}
+KEPT_RAYS = {"sketch": 0.5, "draft": 0.7, "medium": 1.0, "high": 1.6}
 """Times as many rays of which is kept what they met, …"""
 
 BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 20.0, 380.0, 40.0, 30e6
@@ -92,6 +102,16 @@ class LightmappedObject:
         return max(min(self.triangles / 2.0, CHARTS), self.triangles / TRIANGLES_A_CHART)
 
 
+class StageSeconds(NamedTuple):
+    """How long each stage of a bake takes [s]."""
+
+    unwrap: float
+    rasterize: float
+    solve: float
+    light: float
+    encode: float
+
+
 @dataclass(frozen=True)
 class Estimate:
     """What a bake will be.
@@ -103,6 +123,8 @@ class Estimate:
     memory: What it takes in addition to what Blender already uses [bytes], …
     files: … and what does not fit into the memory limit: temporary files take it [bytes].
     seconds: None where it depends on the results: bakes to a target error, and methods for study.
+    stages: How long each stage takes by the hierarchical method [s]; of another method, or to a target error,
+        only how they compare.
     """
 
     pages: tuple[int, ...]
@@ -110,6 +132,7 @@ class Estimate:
     memory: float
     files: float
     seconds: float | None
+    stages: StageSeconds
     densities: tuple[float, ...] = ()
     thinned: tuple[float, ...] = ()
 
@@ -134,7 +157,7 @@ def estimate_bake(
     pages, texels = _pages(objects, settings)
     total = sum(texels)
     crowded = math.sqrt(sum(item.charts for item in objects) / max(total, 1.0))
-    rays = total * (RAYS_A_TEXEL + RAYS_AT_EDGES * crowded)
+    rays = total * (RAYS_A_TEXEL + min(RAYS_AT_EDGES * crowded, MOST_AT_EDGES))
     of_texels = (
         BYTES_AT_LEAST
         + (BYTES_A_RAY + BYTES_AT_EDGES * crowded) * KEPT_RAYS[settings.quality] * rays
@@ -144,14 +167,9 @@ def estimate_bake(
     # Only what belongs to texels can be in files.
     of_scene = waiting_bytes(triangles, faces)
     most = max(room(settings) - of_scene, least_bytes(pages, settings))
-    seconds = None
-    if settings.method == "hierarchical" and settings.relative_error is None:
-        solving = SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45
-        gathering = SECONDS_A_RAY * RAYS[settings.quality] * rays
-        cores = thread_count(settings.threads)
-        kept = sum(item.triangles for item in objects if item.keeps_uvs)
-        laying_out = UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept
-        seconds = laying_out + (solving + gathering) * (CORES / cores) ** 0.6
+    kept = sum(item.triangles for item in objects if item.keeps_uvs)
+    stages = _stages(triangles, kept, total, rays, settings)
+    known = settings.method == "hierarchical" and settings.relative_error is None
     in_memory = min(of_texels, most)
     densities = tuple(
         math.sqrt(count / item.area) if item.area > 0 else 0.0
@@ -162,9 +180,40 @@ def estimate_bake(
         tuple(texels),
         max(of_scene + in_memory, solving_bytes(triangles, faces, settings)),
         of_texels - in_memory,
-        seconds,
+        sum(stages) if known else None,
+        stages,
         densities,
         tuple(thinned),
+    )
+
+
+def estimate_of(bake_scene: BakeScene, settings: BakeSettings) -> Estimate:
+    """Reckon what a bake of an exported scene will be."""
+    areas, triangles = bake_scene.scene.areas, bake_scene.scene.triangles
+    objects = [
+        LightmappedObject(
+            item.name,
+            item.count,
+            float(areas[item.rows] @ item.lit),
+            item.texel_scale * item.thinning,
+            np.stack([triangles[item.rows].min(axis=(0, 1)), triangles[item.rows].max(axis=(0, 1))]),
+            item.uv is not None,
+        )
+        for item in bake_scene.objects
+        if item.bake and item.count
+    ]
+    return estimate_bake(objects, len(bake_scene.scene), settings)
+
+
+def _stages(triangles: int, kept: int, texels: float, rays: float, settings: BakeSettings) -> StageSeconds:
+    """Return how long stages take. `kept` of the triangles keep their layout; `rays` are those of medium."""
+    parallel = (CORES / thread_count(settings.threads)) ** 0.6
+    return StageSeconds(
+        unwrap=UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept,
+        rasterize=FIND_SECONDS * (triangles - kept) + FIND_KEPT_SECONDS * kept + FIND_TEXEL_SECONDS * texels,
+        solve=parallel * SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45,
+        light=parallel * SECONDS_A_RAY * RAYS[settings.quality] * rays,
+        encode=ENCODE_SECONDS * texels + REPORT_SECONDS * (triangles - kept),
     )
 
 
@@ -190,13 +239,7 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
         refuse_many_triangles(len(bake_scene.scene), lit_sides(bake_scene.scene), settings, exported=True)
     sizes = pages_of(settings)
     if sizes is None:
-        areas = bake_scene.scene.areas
-        lit = [
-            LightmappedObject(item.name, item.count, float(areas[item.rows] @ item.lit), item.texel_scale)
-            for item in bake_scene.objects
-            if item.bake and item.count
-        ]
-        sizes = estimate_bake(lit, len(bake_scene.scene), settings).pages
+        sizes = estimate_of(bake_scene, settings).pages
     if settings.texel_density is not None:
         # It is known roughly; what unwrapping finds decides.
         sizes = tuple(int(UNSURE * size) for size in sizes)

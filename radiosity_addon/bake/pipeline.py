@@ -31,7 +31,7 @@ from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
 from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
-from .estimate import refuse_before_unwrapping
+from .estimate import estimate_of, refuse_before_unwrapping
 from .layout import lay_out, padding
 from .quality import for_error, quality_of, used_settings
 from .relight import (
@@ -69,10 +69,6 @@ class TexelValues:
     relightable: Relightable | None = None
     materials: tuple[Array, Array] | None = None
 
-
-UNWRAP, RASTERIZE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
-"""How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
-(bench/results), of which the time left is reckoned."""
 
 MOST_SHOWN = 1 << 22
 """More texels than these are not shown while they are lit: their pictures would take too much memory."""
@@ -126,28 +122,35 @@ def _bake(
 
     give_back()  # what the export freed
     refuse_before_unwrapping(bake_scene, settings)
-    part = progress.stage("unwrap", UNWRAP, RASTERIZE)
+    plan = estimate_of(bake_scene, settings)
+    stages = plan.stages
+    unwrapping, rasterizing, rest = progress.expecting([stages.unwrap, stages.rasterize, sum(stages[2:])])
+    part = unwrapping.stage("unwrap", 0.0, 1.0)
     part.at(0.0)
     with timed(seconds, "unwrap"):
         atlas = lay_out(bake_scene, baked, settings, part)
-    progress.stage("rasterise", RASTERIZE, SOLVE).at(0.0)
+    rasterizing.stage("rasterise", 0.0, 1.0).at(0.0)
     sizes = [page.resolution for page in atlas.pages]
     refuse_large_pages(sizes, settings)
     scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas, scratch)
     give_back()
+    # Texels are known now, and the time to light them is about in proportion.
+    lighting_seconds = stages.light * len(geometry) / max(sum(plan.texels), 1.0)
+    solving, lighting, encoding = rest.expecting([stages.solve, lighting_seconds, stages.encode])
     with timed(seconds, "solve"):
-        solution = solve_scene(bake_scene, quality.solver, progress.part(SOLVE, LIGHT))
-    progress.stage("light", LIGHT, ENCODE).at(0.0)
+        solution = solve_scene(bake_scene, quality.solver, solving)
+    lighting.stage("light", 0.0, 1.0).at(0.0)
     give_back()
     is_shown = share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
         so_far = LightSoFar() if is_shown and len(geometry) <= MOST_SHOWN else None
         look = None if so_far is None else TexelPictures(so_far).next
-        part = progress.stage("light", LIGHT, ENCODE, look)
+        part = lighting.stage("light", 0.0, 1.0, look)
         lit = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far, part)
         del so_far, look, part
+    encoding.stage("encode", 0.0, 0.0).at(0.0)
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     glass = [item.name for item in bake_scene.objects if item.glass is not None]
     report |= {"glass": glass} if glass else {}
@@ -160,8 +163,7 @@ def _bake(
     more = more_of(solution, baked, geometry, lit.light, settings.light)
     del solution  # its elements take as much as seams need
     give_back()
-    part = progress.part(ENCODE, 1.0)
-    return finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds, part)
+    return finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds, encoding)
 
 
 def finish(

@@ -1,4 +1,4 @@
-"""What draft, medium and high mean, part by part."""
+"""What sketch, draft, medium and high mean, part by part."""
 
 from __future__ import annotations
 
@@ -20,6 +20,18 @@ class Quality:
 
 
 QUALITY_SETTINGS = {
+    "sketch": Quality(
+        SolverSettings(
+            shadow_rays=2,
+            error=1e-2,
+            min_area=1e-3,
+            form_factor_error=0.05,
+            elements=250,
+            patches=50,
+            contrast=0.4,
+        ),
+        GatherSettings(strides=(4, 2, 1), support=0.1, rays=48, tolerance=3e-3, cell_rays=4),
+    ),
     "draft": Quality(
         SolverSettings(
             shadow_rays=4,
@@ -114,7 +126,7 @@ get much smaller, each would take less than F_ε of what a whole face sends, and
 be split."""
 
 
-SHOOTING_TOLERANCES = {"draft": 0.02, "medium": 0.005, "high": 0.001}
+SHOOTING_TOLERANCES = {"sketch": 0.05, "draft": 0.02, "medium": 0.005, "high": 0.001}
 """Residuals at which shooting stops: each further tenth takes two shots an element (Cornell box)."""
 
 

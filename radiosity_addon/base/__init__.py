@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .bake_warning import BakeWarning
 from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, UsageError
-from .progress import SILENT, Cancelled, Progress, Status
+from .progress import SILENT, Cancelled, Expected, Progress, Status
 from .similar_warnings import one_of_each
 from .steps import drain, staged
 from .ticks import linear_ticks, tick_label
@@ -18,6 +18,7 @@ __all__ = [
     "BakeError",
     "BakeWarning",
     "Cancelled",
+    "Expected",
     "NothingToDoError",
     "Progress",
     "RadiosityError",

@@ -7,16 +7,23 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from .progress import Expected
+
 FIRST_SECONDS, FIRST_FRACTION = 1.0, 0.1
-"""No estimate before this time and this part of the work: the first steps do not predict the others."""
+"""No estimate before this time and, if nothing is known beforehand, this part of the work: the first steps do
+not predict the others."""
 
 RECENT = 0.35
-"""The pace is that of this last part of the time so far, …"""
+"""Where nothing is known beforehand, the pace is that of this last part of the time so far, …"""
 
 SLOWEST = 0.5
 """… but no less than this share of the mean pace: a step that makes no progress will end."""
 
-SHORTEST_MEMORY, MEMORY = 0.7, 0.08
+TRUSTED = 0.04
+"""What is expected beforehand counts as much as this part of the whole at the expected pace, so that a first
+short step that takes many times as long says little of the others. No estimate before so much is done."""
+
+SHORTEST_MEMORY, MEMORY = 0.7, 0.05
 """The shown time follows a new estimate within this many seconds, or this share of it."""
 
 READING_INTERVAL = 0.05
@@ -24,10 +31,11 @@ READING_INTERVAL = 0.05
 
 
 class RemainingTime:
-    """Estimates the time a job still takes, from the pace at which the fraction done grew lately.
+    """Estimates the time a job still takes.
 
-    That jumps where a stage is quicker or slower than the one before, so what is shown runs down like a
-    clock and follows the estimate smoothly.
+    Where the time of its steps is expected beforehand: what is expected of the rest, times what the work so
+    far took for each second that was expected. Else from the pace at which the fraction done grew lately.
+    What is shown runs down like a clock and follows the estimate smoothly.
 
     clock: Seconds, from any start.
     """
@@ -36,24 +44,40 @@ class RemainingTime:
         self._clock = clock
         self._start = self._last = clock()
         self._readings = deque([(self._start, 0.0)])
+        self._expecting: tuple[float, float] | None = None
         self._shown: float | None = None
 
-    def update(self, fraction: float) -> float | None:
+    def update(self, fraction: float, expected: Expected | None = None) -> float | None:
         """Return the seconds left when a fraction of 0 to 1 is done; None as long as nobody can know."""
         now = self._clock()
         passed, self._last = now - self._last, now
         self._remember(now, fraction)
+        estimate = None
+        if expected is not None:
+            estimate = self._by_expectation(now, expected)
+        elif self._expecting is None and fraction >= FIRST_FRACTION:
+            estimate = (1.0 - fraction) / self._pace(now, fraction)
         if fraction >= 1.0:
             self._shown = 0.0
-        elif now - self._start >= FIRST_SECONDS and fraction >= FIRST_FRACTION:
-            estimate = (1.0 - fraction) / self._pace(now, fraction)
-            if self._shown is None:
-                self._shown = estimate
-            else:
-                running_down = max(self._shown - passed, 0.0)
+        elif self._shown is not None:
+            self._shown = max(self._shown - passed, 0.0)
+            if estimate is not None:
                 follow = 1.0 - math.exp(-passed / max(SHORTEST_MEMORY, MEMORY * estimate))
-                self._shown = running_down + follow * (estimate - running_down)
+                self._shown += follow * (estimate - self._shown)
+        elif now - self._start >= FIRST_SECONDS:
+            self._shown = estimate
         return self._shown
+
+    def _by_expectation(self, now: float, expected: Expected) -> float | None:
+        """Return what is left at the pace of what was done since something was expected; None at first."""
+        if self._expecting is None:
+            self._expecting = now, expected.done
+        start, before = self._expecting
+        trusted = TRUSTED * (expected.done + expected.left)
+        if expected.done - before < trusted:
+            return None
+        slower = (now - start + trusted) / max(expected.done - before + trusted, 1e-9)
+        return slower * expected.left
 
     def _remember(self, now: float, fraction: float) -> None:
         """Note a reading, and forget those before the recent past, except for the last of them."""

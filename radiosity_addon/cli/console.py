@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any, TextIO
 
-from ..base import RemainingTime, duration, one_of_each
+from ..base import Expected, RemainingTime, duration, one_of_each
 from .path_checks import escaped
 
 STAGE_NAMES = {"rasterise": "rasterize"}
@@ -68,12 +68,12 @@ class Console:
                 self._stream.close()
             self._stream = sys.stdout
 
-    def progress(self, stage: str, fraction: float) -> None:
+    def progress(self, stage: str, fraction: float, expected: Expected | None = None) -> None:
         """Show the stage, the overall progress (0 to 1), and the estimated time left."""
         if self.quiet:
             return
         stage = STAGE_NAMES.get(stage, stage)
-        seconds = self._remaining.update(fraction)
+        seconds = self._remaining.update(fraction, expected)
         left = "" if seconds is None or fraction >= 1.0 else f", about {duration(seconds)} left"
         percent = int(100 * min(max(fraction, 0.0), 1.0))
         if self._stream.isatty():

@@ -10,7 +10,7 @@ from .choices import EXPORT_FORMS
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
 from .export_forms import ENGINE_PADDING, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
-from .option_record import UNBOUNDED, Option, option, options_of, plain
+from .option_record import UNBOUNDED, Choice, Option, option, options_of, plain
 from .panel_settings import PANEL_OPTIONS, RELIGHT_GROUP
 from .sections import ADVANCED, EXPORT, GROUPS, LAST_BAKE, MAIN, SECTIONS, SOLVER, sections_of
 
@@ -35,6 +35,7 @@ __all__ = [
     "SYMMETRIC_ONLY",
     "UNBOUNDED",
     "BakeSettings",
+    "Choice",
     "Form",
     "GroupSetting",
     "Option",

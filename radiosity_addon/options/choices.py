@@ -27,6 +27,7 @@ ATLASES = (
 )
 
 QUALITIES = (
+    Choice("sketch", "Sketch", "Fastest: few rays and coarse elements, to place lamps", number=4),
     Choice("draft", "Draft", "Fast: coarse elements and few rays, to judge the light"),
     Choice("medium", "Medium", "Clean light at a moderate time"),
     Choice("high", "High", "Fine elements and many rays, for the final bake"),

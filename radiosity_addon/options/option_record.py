@@ -19,11 +19,15 @@ _METAVARS: dict[type, str] = {int: "N", float: "X"}
 
 
 class Choice(NamedTuple):
-    """One of the values that an option may have."""
+    """One of the values that an option may have.
+
+    number: By which Blender's files know it; None for its place among those that have none.
+    """
 
     value: str
     label: str
     description: str
+    number: int | None = None
 
 
 class PanelRow(NamedTuple):

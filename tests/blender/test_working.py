@@ -52,8 +52,15 @@ def execute(path: Path) -> None:
     bpy.ops.script.execute_preset(filepath=str(path), menu_idname="RADIOSITY_PT_presets")
 
 
-def test_there_are_four_presets_and_blender_finds_them() -> None:
-    assert [path.stem for path in PRESETS] == ["Draft", "Exterior", "Final", "Interior"]
+def test_files_know_a_quality_by_the_number_it_has_had() -> None:
+    items = bpy.context.scene.radiosity.bl_rna.properties["quality"].enum_items
+    assert [item.identifier for item in items] == ["sketch", "draft", "medium", "high", "error"]
+    numbers = {"draft": 0, "medium": 1, "high": 2, "error": 3, "sketch": 4}
+    assert {item.identifier: item.value for item in items} == numbers
+
+
+def test_there_are_five_presets_and_blender_finds_them() -> None:
+    assert [path.stem for path in PRESETS] == ["Draft", "Exterior", "Final", "Interior", "Sketch"]
     assert str(PRESETS[0].parent) in bpy.utils.preset_paths(FOLDER)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from radiosity_addon.base.progress import SILENT, Cancelled, Progress, Status
+from radiosity_addon.base.progress import SILENT, Cancelled, Expected, Progress, Status
 from radiosity_addon.numerics import map_chunks
 from tests.watched import noting, watching
 
@@ -33,6 +33,29 @@ def test_a_stage_has_a_name_and_its_parts_have_it_too() -> None:
     noted: list[Status] = []
     noting(noted).stage("solve", 0.2, 0.4).part(0.5, 1.0).at(0.0)
     assert noted == [Status("solve", pytest.approx(0.3))]
+
+
+def test_steps_take_their_share_of_the_expected_time() -> None:
+    noted: list[Status] = []
+    first, others = noting(noted).expecting([2.0, 6.0])
+    first.at(0.5)
+    # More is known now: what is left takes twice as long, but lies where it lay.
+    second, third = others.expecting([9.0, 3.0])
+    second.part(0.0, 0.5).at(1.0)
+    third.at(1.0)
+    assert fractions(noted) == pytest.approx([0.125, 0.53125, 1.0])
+    found = [status.expected for status in noted]
+    assert found == [Expected(1.0, 7.0), Expected(6.5, 7.5), Expected(14.0, 0.0)]
+
+
+def test_what_follows_a_part_takes_as_long_as_its_share_says() -> None:
+    noted: list[Status] = []
+    for step in noting(noted).part(0.1, 0.9).expecting([4.0, 4.0]):
+        step.at(1.0)
+    assert [status.expected for status in noted] == [
+        Expected(pytest.approx(4.0), pytest.approx(5.0)),
+        Expected(pytest.approx(8.0), pytest.approx(1.0)),
+    ]
 
 
 def test_what_work_shows_is_seen_and_nothing_looks_if_nobody_listens() -> None:

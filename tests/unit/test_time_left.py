@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
+from radiosity_addon.base.progress import Expected
 from radiosity_addon.base.time_left import RemainingTime, duration
 
 
@@ -67,6 +69,54 @@ def test_wrong_weights_are_made_good_as_the_work_goes_on() -> None:
     for left, said in pairs:
         if 1.0 < left < 25.0:
             assert said == pytest.approx(left, rel=0.34, abs=1.0)
+
+
+def by_stages(expected: list[float], took: list[float], step: float = 0.1) -> list[tuple[float, float]]:
+    """Run stages of expected and of real seconds, each even; (time left, told)."""
+    clock = Clock()
+    remaining = RemainingTime(clock)
+    ends, total, pairs = np.cumsum([0.0, *took]), sum(took), []
+    clock.now -= 3.0  # the scene is read, of which nothing is expected
+    for _ in range(3):
+        clock.now += 1.0
+        remaining.update(0.0)
+    for tick in range(round(total / step)):
+        clock.now = 100.0 + tick * step
+        done = float(np.interp(tick * step, ends, np.cumsum([0.0, *expected])))
+        said = remaining.update(done / sum(expected), Expected(done, sum(expected) - done))
+        if said is not None:
+            pairs.append((total - tick * step, said))
+    return pairs
+
+
+@pytest.mark.parametrize("slower", [0.5, 1.0, 2.0])
+def test_a_machine_of_another_speed_is_known_after_a_tenth(slower: float) -> None:
+    expected = [2.0, 3.0, 5.0, 45.0, 5.0]
+    pairs = by_stages(expected, [slower * seconds for seconds in expected])
+    total = slower * sum(expected)
+    assert len(pairs) > 50 * total / 10
+    for left, said in pairs:
+        if 1.0 < left < 0.9 * total:
+            assert left / 1.5 < said < 1.5 * left
+
+
+def test_a_first_stage_that_takes_three_times_as_long_says_little_of_the_others() -> None:
+    for left, said in by_stages([2.0, 3.0, 95.0], [6.0, 3.0, 95.0]):
+        if 1.0 < left < 0.9 * 104.0:
+            assert left / 1.5 < said < 1.5 * left
+
+
+def test_what_comes_after_all_that_was_expected_lets_the_clock_run_down() -> None:
+    clock = Clock()
+    remaining = RemainingTime(clock)
+    clock.now += 2.0
+    for done in range(1, 9):
+        clock.now += 1.0
+        remaining.update(0.1 * done, Expected(float(done), 10.0 - done))
+    before = remaining.update(0.8, Expected(8.0, 2.0))
+    clock.now += 0.5
+    assert before is not None
+    assert remaining.update(0.85) == pytest.approx(before - 0.5)
 
 
 @pytest.mark.parametrize(

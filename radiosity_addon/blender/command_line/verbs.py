@@ -113,7 +113,7 @@ def run_through(job: Generator[Status, None, T], console: Console, interrupts: I
                 return report
             interrupts.check()
             interrupts.deferred = status.stage in WRITING_STAGES
-            console.progress(status.stage, status.fraction)
+            console.progress(status.stage, status.fraction, status.expected)
     finally:
         interrupts.deferred = True
         job.close()

@@ -150,7 +150,7 @@ class WindowJob:
                 self._report = done.value
                 return True
             running.stage, running.fraction = progress.stage, progress.fraction
-            running.seconds_left = self._remaining.update(progress.fraction)
+            running.seconds_left = self._remaining.update(progress.fraction, progress.expected)
             self._follow(progress)
         return False
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
 
-from ...options import OPTIONS, PANEL_OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Option
+from ...options import OPTIONS, PANEL_OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Choice, Option
 
 PREFERRED = ("output_folder", "memory_limit", "threads")
 """Options that the preferences have too, for scenes that do not set them."""
@@ -32,7 +33,7 @@ def option_property(option: Option, **more: Any) -> Any:
         return bpy.props.BoolProperty(default=bool(option.default), **{**words, **more})
     if option.choices:
         choices = (*option.choices, row.other_choice) if row.other_choice else option.choices
-        words["items"] = [(choice.value, choice.label, choice.description) for choice in choices]
+        words["items"] = _items(choices)
         words["default"] = option.default or option.values[0]
         return bpy.props.EnumProperty(**{**words, **more})
     if option.kind is str:
@@ -54,6 +55,16 @@ def option_property(option: Option, **more: Any) -> Any:
     if option.kind is int:
         return bpy.props.IntProperty(**words)
     return bpy.props.FloatProperty(precision=row.precision, step=row.step, **words)
+
+
+def _items(choices: Sequence[Choice]) -> list[tuple[str, str, str, int]]:
+    """Return a menu's items with the numbers that files keep: a choice that came later has one of its own."""
+    places = iter(range(len(choices)))
+    return [
+        (choice.value, choice.label, choice.description, next(places) if number is None else number)
+        for choice in choices
+        for number in [choice.number]
+    ]
 
 
 def properties_of(group: str) -> dict[str, Any]:

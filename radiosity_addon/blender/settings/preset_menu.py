@@ -1,4 +1,4 @@
-"""Presets of settings, by Blender's own mechanism: four that come with the add-on, and the user's own."""
+"""Presets of settings, by Blender's own mechanism: five that come with the add-on, and the user's own."""
 
 from __future__ import annotations
 

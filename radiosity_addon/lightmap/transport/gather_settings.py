@@ -13,6 +13,7 @@ class GatherSettings:
         points do not reach. The last is 1, so that every texel is reached.
     support: A texel whose coarser points weigh less than this together becomes a point itself.
     rays: A gather point.
+    cell_rays: Most rays of a cell that gather rays met where no texel answers.
     sweeps: Jacobi sweeps over the texels, at most, …
     tolerance: … or until no texel changes by more than this part of the mean.
     """
@@ -22,3 +23,4 @@ class GatherSettings:
     rays: int = 256
     sweeps: int = 64
     tolerance: float = 2e-4
+    cell_rays: int = 64

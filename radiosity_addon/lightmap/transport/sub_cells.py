@@ -128,6 +128,7 @@ def gather_sub_cells(
     links: GatherLinks,
     below: Array,
     reflectance: Array,
+    most_rays: int,
     known: Sequence[SubCellHits] = (),
     progress: Progress = SILENT,
 ) -> tuple[SubCells, TableRows]:
@@ -137,19 +138,20 @@ def gather_sub_cells(
         memory than all else.
     below (n,) int32: The leaf elements below the texels, or NOTHING.
     reflectance (n, 3): Of the texels.
+    most_rays: No cell gathers with more.
     known: Those that need not gather. Those that nothing meets are left out.
     """
-    gathering = _SubCellGather(table, known)
+    gathering = _SubCellGather(table, most_rays, known)
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     gathering.take_known()
-    for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.7).turns(0.5), strict=False):
+    for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.5).turns(0.5), strict=False):
         if not gathering.gather_new(turn):
             break
         gathering.take_known()
     small = gathering.small()
     rows = TableRows(table.first_small, small)
-    made = gathering.links(rows, reflectance, progress.part(0.7, 1.0))
+    made = gathering.links(rows, reflectance, progress.part(0.5, 1.0))
     for sources in (links.sources, links.aimed.sources):
         rows.to_rows(sources)
     number = np.concatenate([np.arange(table.texel_count, table.first_small), small])
@@ -160,8 +162,8 @@ def gather_sub_cells(
 class _SubCellGather:
     """Gathers round by round from cells that were met. Their counts start with the first element's."""
 
-    def __init__(self, table: HitTable, known: Sequence[SubCellHits] = ()) -> None:
-        self._table, self._first = table, table.texel_count
+    def __init__(self, table: HitTable, most_rays: int, known: Sequence[SubCellHits] = ()) -> None:
+        self._table, self._first, self._most_rays = table, table.texel_count, most_rays
         self._met = np.zeros(table.end - self._first, dtype=np.int32)
         self._gathered = np.zeros(len(self._met), dtype=bool)
         self._found: list[SubCellHits] = []
@@ -204,7 +206,7 @@ class _SubCellGather:
         for (of_element, rays, cells), part in progress.each(groups):
             if len(cells) == 0:
                 continue
-            gathered = self._table.gather(cells, of_element, rays, part)
+            gathered = self._table.gather(cells, of_element, min(rays, self._most_rays), part)
             self.count(gathered.sources)
             self._found.append(SubCellHits(of_element, cells, gathered.sources, tints=gathered.tints))
         return len(new) > 0

@@ -135,13 +135,13 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
         most_light_elements(hierarchy, settings),
     )
     state.keep_lamps_within_power()
-    progress.at(0.1, state)
+    progress.at(0.2, state)
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
         hierarchy, shapes, caster, settings, link_budget(hierarchy, settings, len(state.light_links))
     )
     state.reset()
-    progress.at(0.3, state)
+    progress.at(0.4, state)
 
     rounds: list[dict[str, float]] = []
     for done, coarsening in enumerate(COARSENING):
@@ -151,7 +151,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
             iterate(state, settings.tolerance if coarsening == 1.0 else ROUGH)
             refined = 0 if exhausted(state) else settle(state, shapes, error * state.power, min_area)
             links_refined += refined
-            progress.at(0.3 + 0.65 * (done + 0.5) / len(COARSENING), state)
+            progress.at(0.4 + 0.55 * (done + 0.5) / len(COARSENING), state)
             if not refined or (coarsening > 1.0 and refined <= MIN_REFINED_SHARE * state.n_links):
                 break
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
