@@ -91,7 +91,9 @@ def test_a_sharp_edge_of_sunlight_leaves_a_footprint_its_lit_part(angle: float) 
     """The edge crosses squares of 0.05 at an angle; its penumbra is as wide as 0.04 of a square at most."""
     side, along = 0.05, np.array([0.6, 0.8])
     at = floor(width=side)
-    squares = replace(at, sampler=lambda rows, u: at.points[rows, None] + _flat(side * (u - 0.5)), near=_grown)
+    squares = replace(
+        at, sampler=lambda rows, u: at.points[rows, None] + _flat(side * (u - 0.5)), near=_grown
+    )
     # Its edge is where x · along = 0.7; past that the floor is in the sun.
     edge = (*(0.7 * along + 5 * np.array([-0.8, 0.6])), 0.5)
     plate = EmbreeCaster(rectangle(edge, (8, -6, 0), (-6, -8, 0)))
