@@ -297,7 +297,7 @@ def _columns(corners: Float, row: Int32, resolution: int) -> tuple[Int32, NDArra
 def _edge_distances(
     uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32
 ) -> tuple[Float, Float, Float]:
-    """Return (p, 3) edge functions at the texels' middles, inside positive, their reach, and those at `CENTER`.
+    """Return (p, 3) edge functions at texels' middles, inside positive, their reach, and those at `CENTER`.
 
     The reach is how much an edge function changes from the middle to the farthest corner.
     """
