@@ -37,7 +37,7 @@ def test_light_reaches_into_a_gap_as_far_as_the_gap_is_high(reflectance: float) 
     lies = (geometry.page == 0) & inner
     # The view factor of a slot's mouth: (1 − cos ϑ)/2, ϑ the height at which its upper edge is seen.
     most = 0.5 * (1.0 - np.cos(np.arctan(GAP / 0.5 / TEXEL)))
-    floor_below, floor_open = lies & (depth > 0.9 * TEXEL), lies & (depth < -0.9 * TEXEL)
+    floor_below, floor_open = lies & (depth > 0.8 * TEXEL), lies & (depth < -0.8 * TEXEL)
     assert floor_below.sum() == 8 * (SIZE - 4)
     # One ray of a point's 256 may find the mouth; what comes in goes to and fro.
     bounces = 1.0 / (1.0 - reflectance**2)

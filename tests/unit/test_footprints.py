@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from radiosity_addon.lights.sun_and_sky import AreaLight, PointLight
+from radiosity_addon.lights.sun_and_sky import AreaLight, PointLight, SunLight
 from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver.emitters.emitters import EmitterGroup
@@ -33,6 +35,15 @@ def floor(expected: float | None = None, width: float = 0.02) -> Footprints:
         lambda rows, u: points_on_triangles(corners[rows], u),
         expected=None if expected is None else np.full(COUNT, expected),
     )
+
+
+def _flat(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([points, np.zeros((*points.shape[:-1], 1))], axis=-1)
+
+
+def _grown(mask: np.ndarray) -> np.ndarray:
+    framed = np.pad(mask.reshape(20, 20), 1)
+    return np.lib.stride_tricks.sliding_window_view(framed, (3, 3)).any(axis=(2, 3)).ravel()
 
 
 def share_of(
@@ -73,6 +84,31 @@ def test_a_lamp_that_adds_little_gets_few_rays_and_the_same_mean(part: float) ->
     assert np.sqrt(((shares - truth) ** 2).mean()) * part < 0.08
     rays = caster.rays / shares.size
     assert rays < {1.0: 64.0, 0.1: 16.0, 0.02: 4.0}[part]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.004])
+def test_a_sharp_edge_of_sunlight_leaves_a_footprint_its_lit_part(angle: float) -> None:
+    """The edge crosses squares of 0.05 at an angle; its penumbra is as wide as 0.04 of a square at most."""
+    side, along = 0.05, np.array([0.6, 0.8])
+    at = floor(width=side)
+    squares = replace(
+        at, sampler=lambda rows, u: at.points[rows, None] + _flat(side * (u - 0.5)), near=_grown
+    )
+    # Its edge is where x · along = 0.7; past that the floor is in the sun.
+    edge = (*(0.7 * along + 5 * np.array([-0.8, 0.6])), 0.5)
+    plate = EmbreeCaster(rectangle(edge, (8, -6, 0), (-6, -8, 0)))
+    sun = SunLight((0, 0, -1), 1.0, angle=angle)
+    share = ShadowShare(plate, sun, SpreadPoints(squares, 2), 5).at_points(np.ones(COUNT), 8)
+    # Part of the unit square where x · along is less than `below`.
+    below = 0.7 / side - (at.points[:, :2] / side - 0.5) @ along
+    corners = np.array([0.0, 0.6, 0.8, 1.4])
+    dark = np.maximum(below[:, None] - corners, 0.0) ** 2 @ (1, -1, -1, 1) / (2 * along.prod())
+    crossed = (below > -0.1) & (below < 1.5)
+    assert crossed.sum() > 25
+    np.testing.assert_allclose(share[~crossed], (below < 0)[~crossed], rtol=0, atol=1e-12)
+    apart = (share - (1.0 - dark))[crossed]
+    assert np.sqrt((apart**2).mean()) < 0.01
+    assert np.abs(apart).max() < 0.03
 
 
 def test_the_threads_change_no_share() -> None:

@@ -71,9 +71,9 @@ def test_a_wall_that_cuts_off_next_to_nothing_touches(part: float) -> None:
 
 def test_a_wall_beyond_the_triangle_that_owns_a_texel_touches_it() -> None:
     """On the floor's diagonal hits land on either triangle, and the wall stands on one of them."""
-    crossings = crossings_of(rectangle((-1, -1 + 0.5 / SIZE, -0.5), (3, 3, 0), (0, 0, 1)))
+    crossings = crossings_of(rectangle((-1, -1 - 0.5 / SIZE, -0.5), (3, 3, 0), (0, 0, 1)))
     texel = np.diagonal(crossings.geometry.index[0])
-    assert (crossings.geometry.triangle[texel] == 0).all()
+    assert (crossings.geometry.triangle[texel] == 1).all()
     assert crossings.touched[texel].all()
 
 

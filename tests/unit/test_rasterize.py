@@ -10,6 +10,7 @@ from radiosity_addon.lightmap.texels.clip import (
     polygon_area_centroid,
 )
 from radiosity_addon.lightmap.texels.rasterization import (
+    CENTER,
     FOOTPRINT,
     coverage_sum,
     rasterize,
@@ -75,8 +76,8 @@ def test_two_triangles_of_a_square_cover_every_texel_once(resolution):
     assert texels.coverage().all()
     assert len(texels) == resolution**2
     np.testing.assert_allclose(coverage_sum(SQUARE, resolution), 1, atol=1e-6)
-    # Below the diagonal the first triangle, above the second; on it both, the first one wins.
-    assert (texels.triangle == (texels.row > texels.column)).all()
+    # Below the diagonal the first triangle, above the second. On it centers are above, as in Blender.
+    assert (texels.triangle == (texels.row >= texels.column)).all()
 
 
 def test_the_triangle_over_the_center_wins_over_a_larger_overlap():
@@ -102,7 +103,7 @@ def test_owner_is_the_centers_triangle_wherever_there_is_one():
     rng = np.random.default_rng(5)
     uv = (rng.uniform(0, 0.9, (60, 1, 2)) + rng.uniform(0, 0.1, (60, 3, 2))).astype(np.float32)
     texels = rasterize(uv, 40)
-    centers = np.stack((texels.column + 0.5, texels.row + 0.5), axis=-1)
+    centers = np.stack((texels.column, texels.row), axis=-1) + CENTER
     hit = np.stack([inside(uv[t].astype(float) * 40, centers) for t in range(len(uv))])
     np.testing.assert_array_equal(hit.any(axis=0), texels.center_inside)
     owned = hit[texels.triangle, np.arange(len(texels))]

@@ -224,7 +224,7 @@ def test_nothing_leaves_the_range_of_what_was_read() -> None:
 
 def test_conjugate_gradients_find_the_least_squares() -> None:
     """Against the dense normal equations, where no value needs to be held in its range."""
-    scene, geometry = two_tiles(24)
+    scene, geometry = two_tiles(26)
     seams = find_seams(scene, geometry)
     values = painted(geometry, light)[0].reshape(-1, 3).astype(np.float64)
     rng = np.random.default_rng(0)

@@ -2,7 +2,7 @@
 
 A texel is the unit square [column, column + 1] × [row, row + 1] in texel coordinates; row 0 is
 v = 0. It is covered where a triangle overlaps it by a positive area, and it belongs to one
-triangle: the one that covers its center, else the one with the largest overlap. Its *footprint*
+triangle: the one that covers its `CENTER`, else the one with the largest overlap. Its *footprint*
 is the overlap, a convex polygon of up to seven corners, over which the lightmap averages. Texels that no
 triangle covers may be shared by triangles without an area on the page (`shared_texels.py`).
 
@@ -39,6 +39,10 @@ UNRESOLVED = 2.0**-23
 
 _CENTER = 2.0
 """Added to the overlap of a pair that covers the center, so that it beats every other overlap."""
+
+CENTER = (0.501, 0.502)
+"""What counts as a texel's center. As in Blender's bake, it is slightly off, so that edges of aligned layouts
+do not run through it (`RE_bake_pixels_populate` in source/blender/render/intern/bake.cc)."""
 
 FOOTPRINT = 0.5
 """Width of a texel's footprint, in texels, where its center is covered. Cycles' bake spreads its samples
@@ -231,7 +235,7 @@ def overlapping_pairs(uv: Float32, resolution: int, centers_only: bool = False) 
 
 def _centered(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _TexelPairs:
     """Return those of the candidate pairs whose center is inside, off the triangle's sides."""
-    distance, reach = _edge_distances(uv, resolution, triangle, row, column)
+    distance, reach, _ = _edge_distances(uv, resolution, triangle, row, column)
     keep = _all_three(distance > 1e-3 * reach)
     texel = row[keep].astype(np.int64) * resolution + column[keep]
     return _TexelPairs(texel, triangle[keep], np.ones(len(texel)), np.ones(len(texel), dtype=np.bool_))
@@ -241,8 +245,8 @@ def _overlaps(
     uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32, double_area: Float
 ) -> _TexelPairs:
     """Return those of the candidate pairs that overlap, with the exact area."""
-    distance, reach = _edge_distances(uv, resolution, triangle, row, column)
-    center = _all_three(distance >= 0)
+    distance, reach, of_center = _edge_distances(uv, resolution, triangle, row, column)
+    center = _all_three(of_center >= 0)
     touches = _all_three(distance + reach > 0)
     whole = _all_three(distance - reach >= 0)
     area = whole.astype(np.float64)
@@ -292,10 +296,10 @@ def _columns(corners: Float, row: Int32, resolution: int) -> tuple[Int32, NDArra
 
 def _edge_distances(
     uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32
-) -> tuple[Float, Float]:
-    """Return (p, 3) edge functions at the texels' centers, inside positive, and their reach.
+) -> tuple[Float, Float, Float]:
+    """Return (p, 3) edge functions at texels' middles, inside positive, their reach, and those at `CENTER`.
 
-    The reach is how much an edge function changes from the center to the farthest corner.
+    The reach is how much an edge function changes from the middle to the farthest corner.
     """
     corners = uv[triangle].astype(np.float64) * resolution
     edge = np.roll(corners, -1, axis=1) - corners
@@ -303,7 +307,8 @@ def _edge_distances(
     y = row[:, None] + 0.5 - corners[..., 1]
     side = np.sign(signed_double_areas(corners))[:, None]
     distance = side * (edge[..., 0] * y - edge[..., 1] * x)
-    return distance, 0.5 * np.abs(edge).sum(axis=2)
+    of_center = distance + side * (edge[..., 0] * (CENTER[1] - 0.5) - edge[..., 1] * (CENTER[0] - 0.5))
+    return distance, 0.5 * np.abs(edge).sum(axis=2), of_center
 
 
 def _clip(
@@ -315,7 +320,7 @@ def _clip(
     left corner as the origin, and which texels are covered whole.
     """
     corners = _around_texels(uv, resolution, triangle, row, column)
-    distance, reach = _edge_distances(uv, resolution, triangle, row, column)
+    distance, reach, _ = _edge_distances(uv, resolution, triangle, row, column)
     whole = _all_three(distance - reach >= 0)
     polygon = np.empty((len(corners), 7, 2))
     polygon[whole] = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 1), (0, 1), (0, 1))

@@ -31,11 +31,11 @@ MIN_SHADOW_RAYS = 2
 """Shadow rays of a lamp that adds hardly anything. A single one would measure the visible share of the lamp,
 not of its light: 0.40 instead of 0.44 behind a plate half way to a near lamp; two measure 0.43."""
 
-STARTS = 16
-"""Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""
-
 UNEVEN = 0.02
 """Rays behind glass disagree if some bring less than the others by more than this part of any channel."""
+
+BOXES = 4
+"""Boxes along a footprint's side: as many rays of a penumbra start in each."""
 
 PENUMBRA_STEPS = 32
 """How far, in neighbors, a penumbra is followed from where few rays found it."""
@@ -181,9 +181,13 @@ def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
     if count <= spread.count:
         return spread.points(rows)[:, :count]
     assert at.sampler is not None
-    starts_used = min(count, STARTS)
-    starts = at.sampler(rows, stratified_square(at.keys[rows], starts_used, seed + Stream.SHADOW_STARTS))
-    return np.asarray(starts[:, np.arange(count) * starts_used // count])
+    # A point for every ray: behind a small lamp the shadow's edge is as sharp as if its rays were one.
+    unit = stratified_square(at.keys[rows], count, seed + Stream.SHADOW_STARTS)
+    if count > BOXES**2:
+        # Each run of rays, which is stratified by itself over the lamp, keeps to a box of the footprint.
+        box = (BOXES * unit).astype(np.int8) @ np.array([BOXES, 1], dtype=np.int8)
+        unit = np.take_along_axis(unit, box.argsort(axis=1, kind="stable")[..., None], axis=1)
+    return np.asarray(at.sampler(rows, unit))
 
 
 def _mean(share: Array) -> Array:
