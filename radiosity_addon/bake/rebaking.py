@@ -64,6 +64,8 @@ def bake_moved(
     report = moves.solved.report
     ever = dict.fromkeys([*report.get("moved", ()), *names])
     report = {**report, "rays": local.caster.rays, "moved": list(ever)}
+    # The solution's own, from before the move.
+    report.pop("power_W", None)
     facts = HierarchyReport(report, moves.solved.warnings)
     baked = baked_objects(bake_scene)
     more = statistics(baked, geometry, light, settings.light), None

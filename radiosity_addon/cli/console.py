@@ -145,7 +145,7 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
             f"share of light that meets a surface: {solver['closure_area_mean']:.4f} (closed scenes: 1)"
         )
     if solver.get("glass"):
-        lines.append(_of_glass(solver["glass"], solver["power_W"]))
+        lines.append(_of_glass(solver["glass"], solver.get("power_W")))
     seconds = report["seconds"]
     lines += [f"  {STAGE_NAMES.get(stage, stage):<24} {taken:7.2f} s" for stage, taken in seconds.items()]
     lines.append(f"  {'total':<24} {sum(seconds.values()):7.2f} s")
@@ -156,10 +156,12 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     return lines
 
 
-def _of_glass(objects: Sequence[str], power: dict[str, float]) -> str:
-    """Say which objects are glass, and what they take of the light."""
+def _of_glass(objects: Sequence[str], power: dict[str, float] | None) -> str:
+    """Say which objects are glass, and what they take of the light, if that is known."""
     named = ", ".join(f"'{name}'" for name in objects[:3]) + (", …" if len(objects) > 3 else "")
-    taken = power.get("absorbed_by_glass", 0.0) / max(power["emitted"], 1e-300)
     count = f"{len(objects)} object{'' if len(objects) == 1 else 's'}"
-    takes = "takes" if len(objects) == 1 else "take"
-    return f"glass: light goes straight through {count} ({named}), which {takes} {taken:.1%} of all light"
+    passes = f"glass: light goes straight through {count} ({named})"
+    if power is None:
+        return passes
+    taken = power.get("absorbed_by_glass", 0.0) / max(power["emitted"], 1e-300)
+    return f"{passes}, which {'takes' if len(objects) == 1 else 'take'} {taken:.1%} of all light"

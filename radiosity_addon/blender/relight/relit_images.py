@@ -24,6 +24,9 @@ from .kept_bakes import group_images_of, images_of
 OF_LIGHT = ("irradiance_W_m2", "illuminance_lx")
 """What the report says of the light on objects: of other light than this, it must not stay."""
 
+POWER = "power_W"
+"""What it says of all light: likewise."""
+
 Images = Mapping[int, bpy.types.Image]
 
 
@@ -132,6 +135,7 @@ def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: fl
         for entry in report["objects"]:
             for name in OF_LIGHT:
                 entry.pop(name, None)
+        report["solver"].pop(POWER, None)
     except (KeyError, TypeError, AttributeError):
         raise BakeError(f"'{output.path / output.names.report}' is damaged: bake again") from None
     report["relit"] = {"seconds": round(seconds, 4)}
