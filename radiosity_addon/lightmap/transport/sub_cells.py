@@ -173,8 +173,9 @@ class _SubCellGather:
         """Note which cells were met."""
         for tile in tiles(len(sources), max(TILE_HITS // max(sources.shape[1], 1), 1)):
             number = sources[tile]
-            cells = number[number >= self._first] - self._first
-            self._met += np.bincount(cells, minlength=len(self._met)).astype(np.int32)
+            # Few of all cells are met by a tile: sums over all of them would take longer than to sort it.
+            cells, met = np.unique(number[number >= self._first] - self._first, return_counts=True)
+            self._met[cells] += met.astype(np.int32)
 
     def take_known(self) -> None:
         """Take the known cells that were met, and those that these met in turn.
