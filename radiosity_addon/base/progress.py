@@ -112,7 +112,8 @@ class Progress:
             left *= 1.0 - share
 
     def _of_whole(self, fraction: float) -> float:
-        return self.begin + (self.end - self.begin) * fraction
+        # Rounded, it must not be beyond where the next part begins.
+        return min(self.begin + (self.end - self.begin) * fraction, self.end)
 
 
 SILENT = Progress()

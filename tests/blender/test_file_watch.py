@@ -221,7 +221,7 @@ class Job(window_job.WindowJob):
         for number in range(10):
             self.steps += 1
             time.sleep(2 * window_job.TICK)
-            yield SimpleNamespace(stage="solve", fraction=number / 10)
+            yield SimpleNamespace(stage="solve", fraction=number / 10, expected=None)
 
 
 def test_only_its_own_timer_carries_a_job_on(monkeypatch: pytest.MonkeyPatch) -> None:
