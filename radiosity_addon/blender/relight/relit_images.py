@@ -25,7 +25,7 @@ OF_LIGHT = ("irradiance_W_m2", "illuminance_lx")
 """What the report says of the light on objects: of other light than this, it must not stay."""
 
 POWER = "power_W"
-"""What it says of all light: likewise."""
+"""What it says of the power of all light: it goes as well."""
 
 Images = Mapping[int, bpy.types.Image]
 

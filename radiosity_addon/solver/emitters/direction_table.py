@@ -3,7 +3,7 @@
 A group's light at a point, Σ w max(n · ω, 0) cos θ / π d², is expanded around the group's center to first
 order in its size: the area that shows along a direction, and how the places of its faces change distance and
 cosines. Tables hold both over the octahedral map of directions (Meyer et al., On floating-point normal
-vectors, 2010). Of second order 3 (r / d)² is left out at most.
+vectors, 2010). What is left out is of second order: 3 (r / d)² for two plates back to back.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ MOST_SLANT = 0.35
 """… (the sine of the angle to the farthest from their mean), and none of its faces is turned away."""
 
 FAR = 10.0
-"""From this many radii on a node above the horizon sends like a disk of its area."""
+"""From this many radii on a node above the horizon sends like a disk of its area, or by its table."""
 
 FLAT_SINE = 1e-5
 """Sine of the angle to the farthest normal of a flat group."""
