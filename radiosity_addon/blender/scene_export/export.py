@@ -359,7 +359,7 @@ def _degenerate_warning(name: str, count: int) -> BakeWarning:
 
 def all_glass(name: str) -> str:
     """Return the error for a bake of nothing but glass, of which `name` is some."""
-    return f"object '{name}' is glass and gets no lightmap, and nothing else is to be baked: bake other objects too"
+    return f"object '{name}' is glass and gets no lightmap, and nothing else is to be baked: bake others too"
 
 
 def _no_light(name: str) -> BakeWarning:
