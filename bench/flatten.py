@@ -17,6 +17,9 @@ from radiosity_addon.scene.scene import Scene
 
 from .interior.blender_parts import even_sky
 
+MANY_KINDS = 256
+"""Of an object's surfaces; if there are more, reflectances are rounded to 0.01."""
+
 
 def flatten(sky: tuple[float, float, float] | None) -> None:
     """Replace the open scene's meshes and materials; `sky` lights it instead of the world it has."""
@@ -49,8 +52,7 @@ def _add(
     mesh = bpy.data.meshes.new(item.name)
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)
     mesh.from_pydata(triangles.reshape(-1, 3).tolist(), [], faces.tolist())
-    surfaces = np.concatenate([solved.reflectance[item.rows], solved.emission[item.rows]], axis=1)
-    kinds, which = np.unique(np.round(surfaces, 6), axis=0, return_inverse=True)
+    kinds, which = _kinds(solved.reflectance[item.rows], solved.emission[item.rows])
     for kind in kinds:
         mesh.materials.append(_material(tuple(float(v) for v in kind), materials))
     mesh.polygons.foreach_set("material_index", which.ravel().astype(np.int32))
@@ -60,6 +62,17 @@ def _add(
         mesh.normals_split_custom_set(normals.reshape(-1, 3).tolist())
     mesh.update()
     scene.collection.objects.link(bpy.data.objects.new(item.name, mesh))
+
+
+def _kinds(reflectance: np.ndarray, emission: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (k, 6) distinct pairs of reflectance and emission [W/m²], and which of them each triangle has."""
+    surfaces = np.concatenate([np.round(reflectance, 6), np.round(emission, 6)], axis=1)
+    kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
+    if len(kinds) > MANY_KINDS:
+        # Textures: every triangle has a mean of its own, and a material each would take hours.
+        surfaces[:, :3] = np.round(reflectance, 2)
+        kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
+    return kinds, which
 
 
 def _material(
