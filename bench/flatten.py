@@ -18,7 +18,7 @@ from radiosity_addon.scene.scene import Scene
 from .interior.blender_parts import even_sky
 
 MANY_KINDS = 256
-"""Of an object's surfaces; if there are more, reflectances are rounded to 0.01."""
+"""Of an object's surfaces; if there are more, reflectances are rounded to 0.05."""
 
 
 def flatten(sky: tuple[float, float, float] | None) -> None:
@@ -70,7 +70,7 @@ def _kinds(reflectance: np.ndarray, emission: np.ndarray) -> tuple[np.ndarray, n
     kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
     if len(kinds) > MANY_KINDS:
         # Textures: every triangle has a mean of its own, and a material each would take hours.
-        surfaces[:, :3] = np.round(reflectance, 2)
+        surfaces[:, :3] = np.round(20.0 * reflectance) / 20.0
         kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
     return kinds, which
 
