@@ -65,7 +65,7 @@ def _add(
 
 
 def _kinds(reflectance: np.ndarray, emission: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (k, 6) distinct pairs of reflectance and emission [W/m²], and which of them each triangle has."""
+    """Return (k, 6) distinct reflectances and emissions [W/m²], and which of them each triangle has."""
     surfaces = np.concatenate([np.round(reflectance, 6), np.round(emission, 6)], axis=1)
     kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
     if len(kinds) > MANY_KINDS:

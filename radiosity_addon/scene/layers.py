@@ -55,6 +55,9 @@ MOST_COVERS = 16
 INSIDE = -1e-9
 """Points of a polygon's rim are in it."""
 
+BOX_MARGIN = 1e-3
+"""Points that far outside the box around a polygon are not in it, whatever is rounded."""
+
 
 @dataclass(frozen=True)
 class Covers:
@@ -95,9 +98,10 @@ class Layers:
         contact, pressed = _contacts(scene, pairs, tolerance)
         covers = _covers(scene, pairs, tolerance, emits, contact)
         self.covers = _sorted([covers, _whole_covers(scene, copy, original)])
-        self._first = np.searchsorted(self.covers.side, np.arange(2 * len(scene) + 1))
-        self._pressed = pressed
-        self._first_pressed = np.searchsorted(pressed.side, 2 * np.arange(len(scene) + 1))
+        first = np.searchsorted(self.covers.side, np.arange(2 * len(scene) + 1))
+        self._covered = PolygonRuns(first, self.covers.part)
+        first = np.searchsorted(pressed.side, 2 * np.arange(len(scene) + 1))
+        self._pressed = PolygonRuns(first, pressed.part)
 
     def __bool__(self) -> bool:
         return len(self.covers) > 0
@@ -118,7 +122,7 @@ class Layers:
         side, place = side[moved].astype(np.int64), hits.barycentric[moved].astype(np.float64)
         waiting = np.arange(len(moved))
         for _ in range(MOST_COVERS):
-            row, cover = holding(self._first, self.covers.part, side[waiting], place[waiting])
+            row, cover = self._covered.holding(side[waiting], place[waiting])
             cut = None if self._scene.images is None else self._scene.images.cut_out
             if cut is not None:
                 solid = ~cut[self.covers.by[cover] // 2]
@@ -142,19 +146,18 @@ class Layers:
         Only of those fronts that something solid is behind.
         """
         found = np.zeros(len(triangle), dtype=bool)
-        if len(self._pressed):
-            row, _ = holding(self._first_pressed, self._pressed.part, triangle, barycentric)
-            found[row] = True
+        row, _ = self._pressed.holding(triangle, barycentric)
+        found[row] = True
         return found
 
     @cached_property
     def pressed_triangles(self) -> Array:
         """(t,) bool: triangles of which some points are pressed."""
-        return np.diff(self._first_pressed) > 0
+        return np.diff(self._pressed.first) > 0
 
     @cached_property
     def _is_covered(self) -> Array:
-        return np.diff(self._first) > 0
+        return np.diff(self._covered.first) > 0
 
     def points(self, side: Array, place: Array) -> Array:
         """Return (n, 3) the points of sides at weights (n, 2) of their triangles' corners [m]."""
@@ -166,24 +169,32 @@ class Layers:
         return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1.0))
 
 
-def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:
-    """Return the pairs of points (n,) and parts that they lie in.
+class PolygonRuns:
+    """Runs of convex polygons (c, k, 2), one run for each row; `first` (r + 1,) int is where they begin."""
 
-    first (r + 1,) int: The run of parts of each row.
-    parts (c, k, 2).
-    row (n,) int.
-    place (n, 2).
-    """
-    count = first[row + 1] - first[row]
-    point = np.repeat(np.arange(len(row)), count)
-    part = run_numbers(count, first[row])
-    corners = parts.shape[1]
-    for edge in range(corners):
-        # Most pairs fail at one of the first edges.
-        side = parts[part[:, None], [[edge, (edge + 1) % corners]]]
-        inside = edge_distances(place[point][:, None], side, 0)[:, 0] >= INSIDE
-        point, part = point[inside], part[inside]
-    return point, part
+    def __init__(self, first: Array, polygons: Array) -> None:
+        self.first, self._polygons = first, polygons
+        self._low, self._high = polygons.min(axis=1) - BOX_MARGIN, polygons.max(axis=1) + BOX_MARGIN
+
+    def holding(self, row: Array, place: Array) -> tuple[Array, Array]:
+        """Return the pairs of points (n,) and polygons of their `row` (n,) that they lie in.
+
+        place (n, 2).
+        """
+        count = self.first[row + 1] - self.first[row]
+        point = np.repeat(np.arange(len(row)), count)
+        polygon = run_numbers(count, self.first[row])
+        for axis in range(2):
+            along = place[:, axis].take(point)
+            near = (along >= self._low[:, axis].take(polygon)) & (along <= self._high[:, axis].take(polygon))
+            point, polygon = point[near], polygon[near]
+        corners = self._polygons.shape[1]
+        for edge in range(corners):
+            # Most pairs fail at one of the first edges.
+            side = self._polygons[polygon[:, None], [[edge, (edge + 1) % corners]]]
+            inside = edge_distances(place[point][:, None], side, 0)[:, 0] >= INSIDE
+            point, polygon = point[inside], polygon[inside]
+        return point, polygon
 
 
 def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple[Array, Covers]:

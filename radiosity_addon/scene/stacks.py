@@ -10,7 +10,7 @@ import numpy as np
 
 from ..numerics import Array
 from ..rays import Hits
-from .layers import MOST_COVERS, Layers, holding
+from .layers import MOST_COVERS, Layers, PolygonRuns
 from .scene import Scene
 
 
@@ -33,9 +33,9 @@ class Stacks:
         order = np.argsort(side, kind="stable")
         turned = (covers.side ^ covers.by) & 1 == 1
         in_cover = np.where(turned[:, None, None], covers.in_cover[:, ::-1], covers.in_cover)
-        self._part = np.concatenate([covers.part, in_cover])[order]
+        part = np.concatenate([covers.part, in_cover])[order]
         self._other = np.concatenate([covers.by, covers.side])[order]
-        self._first = np.searchsorted(side[order], np.arange(2 * len(scene) + 1))
+        self._parts = PolygonRuns(np.searchsorted(side[order], np.arange(2 * len(scene) + 1)), part)
         self._depth = _depths(covers.side, covers.by, 2 * len(scene))
 
     def __bool__(self) -> bool:
@@ -46,7 +46,7 @@ class Stacks:
         ray = np.arange(len(hits.triangle))
         side = 2 * hits.triangle.astype(np.int64) + ~hits.front
         place = hits.barycentric.astype(np.float64)
-        hit_row, part = holding(self._first, self._part, side, place)
+        hit_row, part = self._parts.holding(side, place)
         if len(hit_row) == 0:
             return ray, hits
         other = self._other[part]

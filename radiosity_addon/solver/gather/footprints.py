@@ -23,9 +23,9 @@ SAME_GAIN = 0.02
 """Where a lamp gives the center of a footprint what it gives its farthest point, up to this
 part, the center stands for all: what bends that little bends a mean by its square."""
 
-UNEVEN, MORE_GAINS = 0.02, 64
-"""Where the few points differ by more than this part, as next to a lamp and at the rim of a spot's cone,
-this many are evaluated."""
+UNEVEN = ((0.02, 16), (0.1, 64))
+"""Where a few points of a texel differ by more than a part, as next to a lamp or at the rim of a spot's cone,
+so many are evaluated. Cells, which only answer rays, are evaluated at few: many cells are averaged."""
 
 EDGE_DIFFERENCE = 0.5
 """Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
@@ -138,7 +138,7 @@ class SpreadPoints:
             doubted = row_numbers(at.near(lit) & at.near(~lit) & at.near(counts) & ~crossed)
             crossed[doubted] = self.is_cut(light, doubted, lit[doubted])
             rows = row_numbers(crossed & at.near(counts))
-            gain[rows] = self.many(light, rows)
+            gain[rows], _ = self.many(light, rows, UNEVEN[-1][1])
         return gain
 
     def matters(self, light: Lamp | EmitterGroup, gain: Array, rows: slice) -> Array:
@@ -165,16 +165,17 @@ class SpreadPoints:
             cut[chunk] = (bright != lit[chunk, None]).any(axis=1)
         return cut
 
-    def many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
-        """Return (r,) the mean gain at some rows, by many points of each."""
-        mean = np.empty(len(rows))
-        step = CHUNK_POINTS // MORE_GAINS * SPREAD
+    def many(self, light: Lamp | EmitterGroup, rows: Array, count: int) -> tuple[Array, Array]:
+        """Return (r,) the mean gain at some rows, by `count` points of each, and its standard deviation."""
+        mean, deviation = np.empty((2, len(rows)))
+        step = CHUNK_POINTS // count * SPREAD
         for start in range(0, len(rows), step):
-            chunk = rows[start : start + step]
-            unit = stratified_square(self.at.keys[chunk], MORE_GAINS, self._seed)
+            part = slice(start, start + step)
+            unit = stratified_square(self.at.keys[rows[part]], count, self._seed)
             assert self.at.sampler is not None
-            mean[start : start + step] = self.gains(light, chunk, self.at.sampler(chunk, unit)).mean(axis=1)
-        return mean
+            each = self.gains(light, rows[part], self.at.sampler(rows[part], unit))
+            mean[part], deviation[part] = each.mean(axis=1), each.std(axis=1)
+        return mean, deviation
 
     def gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
@@ -216,7 +217,10 @@ def _varying(spread: SpreadPoints, light: Lamp | EmitterGroup, bent: Array, part
     """Return (r,) the mean gain at rows over which it varies."""
     rows = bent[part]
     each = spread.gains(light, rows, spread.points(rows))
-    mean = each.mean(axis=1)
-    uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
-    mean[uneven] = spread.many(light, rows[uneven])
+    mean, deviation = each.mean(axis=1), each.std(axis=1)
+    if spread.at.near is None:
+        return np.asarray(mean)
+    for least, count in UNEVEN:
+        uneven = np.flatnonzero(deviation > least * mean)
+        mean[uneven], deviation[uneven] = spread.many(light, rows[uneven], count)
     return np.asarray(mean)
