@@ -161,7 +161,7 @@ def damaged(path: Path | str) -> BakeError:
 def _relight(kept: KeptBake, wanted: Array, progress: Progress) -> tuple[LightmapPage, ...]:
     """Compute the lightmaps for strengths that are checked."""
     scratch = kept.geometry.scratch
-    light = relight_texels(kept.lit, kept.solved, wanted, scratch, progress.part(0.0, 0.95))
+    light = relight_texels(kept.lit, kept.geometry, kept.solved, wanted, scratch, progress.part(0.0, 0.95))
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
     values = held_values(light, kept.reflectance, emission, kept.settings, scratch)
     pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))

@@ -16,7 +16,7 @@ from typing import Any
 from ...base import BakeError, RadiosityError
 from ...files import BAKE, DIGEST, FILE, KEPT
 from ...lightmap.images import LightmapPage, Seams
-from ...lightmap.points import Interpolation
+from ...lightmap.points import Interpolation, Smoothing
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.transport import (
     GatherLinks,
@@ -44,7 +44,7 @@ from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest,
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
-MAGIC, FORMAT = b"RADIOSITYRELIGHT", 4
+MAGIC, FORMAT = b"RADIOSITYRELIGHT", 5
 """The format rises with every change of the stored fields (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
@@ -54,7 +54,16 @@ STORED_CLASSES: tuple[type, ...] = (
     *(PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch),
     *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
     *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks, Balance),
-    *(RelightableTexels, TexelTransport, GatherLinks, AimedRays, Interpolation, SubCells, SubCellLinks),
+    *(
+        RelightableTexels,
+        TexelTransport,
+        GatherLinks,
+        AimedRays,
+        Interpolation,
+        SubCells,
+        SubCellLinks,
+        Smoothing,
+    ),
     *(LightGains, WarmStart, TexelGeometry, Seams),
 )
 """The classes that may be stored: those that relighting reads."""

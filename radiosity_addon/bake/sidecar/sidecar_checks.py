@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...lightmap.images import Seams
-from ...lightmap.points import Interpolation
+from ...lightmap.points import PASSES, Interpolation, Smoothing
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.transport import (
     GatherLinks,
@@ -231,6 +231,9 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
         _check_gains(instance(level.gains, LightGains), count, lamps)
     _check_gains(instance(lit.gains, LightGains), texels, lamps)
     integers(lit.element, (texels,), NOTHING, elements - 1)
+    smoothing = instance(lit.smoothing, Smoothing)
+    integers(smoothing.alike, (texels,), 0, 255)
+    integers(smoothing.passes, (texels,), 0, PASSES[-1])
     whole(lit.sweeps, 0, MOST_ROUNDS)
     number(lit.tolerance, 0.0)
     known = instance(instance(lit.warm_start, WarmStart).solutions, list)

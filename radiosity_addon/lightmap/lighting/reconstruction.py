@@ -20,6 +20,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...scene import Scene
 from ...solver.gather import Footprints, LightGains, LocalPass, values_of
+from ..points import alike_neighbors
 from ..texels import SmoothLift, TexelGeometry, find_crossings, texel_materials
 from ..transport import (
     GatherPointLayout,
@@ -27,6 +28,7 @@ from ..transport import (
     HitTable,
     LightingRecord,
     RelightableTexels,
+    SmoothingChoice,
     TableRows,
     TexelLight,
     TexelTransport,
@@ -100,6 +102,7 @@ def light_texels(
         start = _hierarchy_start(local, element, geometry)
     else:
         start, transport = standing.start(transport, rows, element, more)
+    alike = alike_neighbors(geometry, local.caster, crossings.alone, geometry.scratch, local.threads)
     light = sweep(
         transport,
         start,
@@ -108,7 +111,7 @@ def light_texels(
         sweeps=settings.sweeps,
         tolerance=settings.tolerance,
         threads=local.threads,
-        estimate=previous is None,
+        smooth=SmoothingChoice(geometry, alike),
         seen=None if so_far is None else so_far.swept,
         scratch=geometry.scratch,
         progress=progress.part(PARTS, 1.0),
@@ -119,8 +122,11 @@ def light_texels(
     progress.at(1.0)
     if gains is None or layout is None or local.direct.sources is None or light.table is None:
         return light
+    assert light.smoothing is not None  # chosen from the noise
     warm_start = WarmStart(local.direct.sources.strengths, light.table)
-    lit = RelightableTexels(transport, gains, element, settings.sweeps, settings.tolerance, warm_start)
+    lit = RelightableTexels(
+        transport, gains, element, settings.sweeps, settings.tolerance, warm_start, light.smoothing
+    )
     bright = local.gather.bright if standing is None else standing.bright
     return replace(light, kept=lit, traced=LightingRecord(settings, table, layout, rows, bright, error))
 

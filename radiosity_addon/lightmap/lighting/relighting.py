@@ -15,7 +15,8 @@ from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, tiles
 from ...solver.element_transport import Relightable
 from ...solver.gather import table_end, values_of
-from ..transport import RelightableTexels, TexelLight, sweep
+from ..texels import TexelGeometry
+from ..transport import RelightableTexels, SmoothingChoice, TexelLight, sweep
 
 SOLVED = 0.3
 """How much is done when the hierarchy is solved; rough."""
@@ -23,6 +24,7 @@ SOLVED = 0.3
 
 def relight_texels(
     kept: RelightableTexels,
+    geometry: TexelGeometry,
     solved: Relightable,
     strengths: Array,
     scratch: Scratch | None = None,
@@ -33,6 +35,8 @@ def relight_texels(
     Parameters
     ----------
     kept : RelightableTexels
+    geometry : TexelGeometry
+        Only the places of texels on their pages are used.
     solved : Relightable
     strengths : (s, 3) float64
         See `LightSources.strengths` for units.
@@ -74,6 +78,7 @@ def relight_texels(
         tolerance=kept.tolerance,
         threads=local.threads,
         estimate=False,
+        smooth=SmoothingChoice(geometry, kept.smoothing.alike, kept.smoothing),
         scratch=scratch,
         progress=progress.part(SOLVED, 1.0),
     )
@@ -86,6 +91,7 @@ def kept_bytes(kept: RelightableTexels) -> int:
     """Return what kept links and gains take in memory [bytes]."""
     links, cells = kept.transport.links, kept.transport.cells
     total = links.sources.nbytes + links.aimed.sources.nbytes + links.aimed.weights.nbytes
+    total += kept.smoothing.alike.nbytes + kept.smoothing.passes.nbytes
     total += kept.gains.nbytes + kept.element.nbytes + kept.transport.reflectance.nbytes
     total += 0 if links.tints is None else links.tints.nbytes
     for level in cells.links:

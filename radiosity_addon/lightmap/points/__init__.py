@@ -7,10 +7,16 @@ from __future__ import annotations
 
 from .interpolation import GatherPoints, Interpolation, fit
 from .refitting import refit
+from .smoothing import PASSES, Smoothing, alike_neighbors, choose_smoothing, columns
 
 __all__ = [
+    "PASSES",
     "GatherPoints",
     "Interpolation",
+    "Smoothing",
+    "alike_neighbors",
+    "choose_smoothing",
+    "columns",
     "fit",
     "refit",
 ]

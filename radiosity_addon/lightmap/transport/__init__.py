@@ -10,7 +10,7 @@ from .gather_points import STARTS, KeptPoints, gather_footprints, gather_texels,
 from .gather_settings import GatherSettings
 from .hit_table import HitTable, TableRows
 from .sub_cells import SubCellHits, SubCellLinks, SubCells, gather_sub_cells
-from .sweeps import RelightableTexels, TexelLight, TexelTransport, sweep
+from .sweeps import RelightableTexels, SmoothingChoice, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
 from .warm_start import WarmStart
 
@@ -23,6 +23,7 @@ __all__ = [
     "KeptPoints",
     "LightingRecord",
     "RelightableTexels",
+    "SmoothingChoice",
     "SubCellHits",
     "SubCellLinks",
     "SubCells",

@@ -13,6 +13,8 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, row_numbers, tiles, trim
 from ...solver.gather import LightGains
+from ..points import Smoothing, choose_smoothing, columns
+from ..texels import TexelGeometry
 from .gather_links import GatherLinks
 from .source_means import CHUNK_HITS, SourceMeans, by_channel, mean_of_sources
 from .sub_cells import SubCells, SubCellSweeps
@@ -52,6 +54,8 @@ class TexelLight:
         What `error` is the mean of: the estimated error of each texel.
     state : (n,) uint8 or None
         What geometry does to each, see `TEXEL_STATES`.
+    smoothing : Smoothing or None
+        How noise was shared, if it was.
     """
 
     direct: Array
@@ -62,6 +66,7 @@ class TexelLight:
     traced: LightingRecord | None = None
     noise: Array | None = None
     state: Array | None = None
+    smoothing: Smoothing | None = None
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,8 @@ class RelightableTexels:
         As for `sweep`.
     warm_start : WarmStart
         What was solved before, the bake's own light first.
+    smoothing : Smoothing
+        How noise is shared, chosen for the bake's own light.
     """
 
     transport: TexelTransport
@@ -105,6 +112,19 @@ class RelightableTexels:
     sweeps: int
     tolerance: float
     warm_start: WarmStart
+    smoothing: Smoothing
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothingChoice:
+    """How noise is to be shared: as is `known`, or as is best for the light that is found.
+
+    alike: (n,) uint8, see `Smoothing`.
+    """
+
+    geometry: TexelGeometry
+    alike: Array
+    known: Smoothing | None = None
 
 
 def sweep(
@@ -116,6 +136,7 @@ def sweep(
     tolerance: float = TOLERANCE,
     threads: int = 0,
     estimate: bool = True,
+    smooth: SmoothingChoice | None = None,
     seen: Callable[[Array], None] | None = None,
     scratch: Scratch | None = None,
     progress: Progress = SILENT,
@@ -137,6 +158,8 @@ def sweep(
         … or until no texel changes by more than this part of the mean.
     estimate : bool
         Whether the error is estimated.
+    smooth : SmoothingChoice or None
+        How noise is shared between texels in the end; None if it is not.
     seen : callable or None
         Is given the (n, 3) irradiance after every sweep [W/m²], to be looked at.
     scratch : Scratch or None
@@ -194,14 +217,40 @@ def sweep(
             seen(direct + indirect)
         if largest <= tolerance * total / max(3 * texel_count, 1):
             break
-    if not estimate:
-        return TexelLight(direct, indirect, 0.0, table[:surfaces])
-    noise = estimated_noise(links, table, threads, scratch)
+    smoothing = None if smooth is None else smooth.known
+    noise = None
+    if estimate:
+        noise = estimated_noise(links, table, threads, scratch)
+        if smooth is not None and smoothing is None:
+            gathered = _difference(direct, lamps, scratch)
+            for rows in tiles(texel_count):
+                gathered[rows] += indirect[rows]
+            smoothing = choose_smoothing(smooth.geometry, smooth.alike, gathered, noise, threads)
+    if smooth is not None and smoothing is not None:
+        parts = [indirect] if noise is None else [indirect, noise]
+        if beyond.any():
+            parts.append(_difference(direct, lamps, scratch))
+        shared = smoothing(smooth.geometry, columns(parts, scratch), threads)
+        for rows in tiles(texel_count):
+            indirect[rows] = np.maximum(shared[rows, :3], 0.0)
+            if beyond.any():
+                direct[rows] = lamps[rows] + np.maximum(shared[rows, -3:], 0.0)
+        noise = None if noise is None else shared[:, 3:6]
+    if noise is None:
+        return TexelLight(direct, indirect, 0.0, table[:surfaces], smoothing=smoothing)
     error = relative_error(noise, direct, indirect)
     each = scratch.empty(texel_count, np.float32)
     for rows in tiles(texel_count):
         each[rows] = np.sqrt((noise[rows] ** 2).mean(axis=1))
-    return TexelLight(direct, indirect, error, table[:surfaces], noise=each)
+    return TexelLight(direct, indirect, error, table[:surfaces], noise=each, smoothing=smoothing)
+
+
+def _difference(whole: Array, part: Array, scratch: Scratch) -> Array:
+    """Return (n, 3) `whole` without `part`."""
+    result = scratch.empty(whole.shape)
+    for rows in tiles(len(result)):
+        result[rows] = whole[rows] - part[rows]
+    return result
 
 
 def relative_error(noise: Array, *irradiance: Array) -> float:

@@ -1,0 +1,238 @@
+"""Noise of gathered light shared between texels of one surface that see each other.
+
+The light that neighboring texels gather differs by their noise and by little else, except where it bends. A
+3 × 3 local linear fit, applied again and again, averages over more and more texels and keeps what is
+linear. How often is decided texel by texel, by an estimate of the squared error: what the fits change beyond
+what they change of the noise itself is bias, and what they leave of the noise is variance (Stein's unbiased
+what they change of the noise itself is bias, and what they leave of the noise is variance (Stein's unbiased risk
+The choice is kept: for other light the operator is the same, and so it is linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ...numerics import Array, Scratch, fill_chunks, tiles
+from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
+from ..texels import TexelGeometry
+
+PASSES = (1, 2, 4, 8, 16)
+"""How often the fit may be applied to a texel, besides not at all."""
+
+RISK_PASSES = 4
+"""Means over 3 × 3 texels that the estimate of the squared error is averaged by."""
+
+APART, ALIKE, OFF_PLANE = 1.6, 0.9, 0.35
+"""Neighbors on the page are neighbors on the surface if they are no farther apart in the world than this many
+steps of the page, their normals have this cosine at least, and they are this part of a step off each other's
+plane at most."""
+
+DAMPING = 0.02
+"""Pull of the fitted slopes toward zero."""
+
+CHUNK = 1 << 14
+"""Texels smoothed at once; bounds the temporaries to about 10 MB a thread."""
+
+_STEPS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
+"""(8, 2): rows and columns from a texel to its neighbors."""
+
+
+def _fits() -> Array:
+    """Return (256, 9) weights of the linear fit: of the texel and the neighbors that a number's bits name."""
+    there = np.concatenate([np.ones((256, 1)), (np.arange(256)[:, None] >> np.arange(8)) & 1], axis=1)
+    steps = np.concatenate([np.zeros((1, 2)), _STEPS])
+    weight = there * 0.5 ** np.abs(steps).sum(axis=1)
+    basis = np.concatenate([np.ones((9, 1)), steps], axis=1)
+    system = np.einsum("nk,ka,kb->nab", weight, basis, basis)
+    slopes = np.arange(1, 3)
+    system[:, slopes, slopes] += DAMPING * weight.sum(axis=1, keepdims=True)
+    return np.asarray(weight * (np.linalg.inv(system)[:, 0] @ basis.T)).astype(np.float32)
+
+
+def _means() -> Array:
+    """Return (256, 9) weights of the mean over a texel and the neighbors that a number's bits name."""
+    there = np.concatenate([np.ones((256, 1)), (np.arange(256)[:, None] >> np.arange(8)) & 1], axis=1)
+    return np.asarray(there / there.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+_FITS, _MEANS = _fits(), _means()
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothing:
+    """How n texels share noise with their neighbors: a linear operator.
+
+    Attributes
+    ----------
+    alike : (n,) uint8
+        Which of the eight neighbors on the page, bit by bit, belong to a texel.
+    passes : (n,) uint8
+        How often the fit is applied.
+    """
+
+    alike: Array
+    passes: Array
+
+    def __call__(self, geometry: TexelGeometry, values: Array, threads: int = 0) -> Array:
+        """Return (n, k) float32 values (n, k) float32 of the texels, smoothed."""
+        grid = _Grid(geometry, self.alike, threads)
+        current = values
+        result = geometry.scratch.empty(values.shape, np.float32)
+        for rows in tiles(len(values)):
+            result[rows] = values[rows]
+        most, done = int(self.passes.max(initial=0)), 0
+        for passes in PASSES:
+            if passes > most:
+                break
+            for _ in range(passes - done):
+                current = grid.weighed(_FITS, current)
+            done = passes
+            for rows in tiles(len(values)):
+                chosen = self.passes[rows] == passes
+                result[rows][chosen] = current[rows][chosen]
+        return result
+
+
+def choose_smoothing(
+    geometry: TexelGeometry, alike: Array, values: Array, noise: Array, threads: int = 0
+) -> Smoothing:
+    """Choose how often the fit is applied to each texel.
+
+    Parameters
+    ----------
+    alike : (n,) uint8
+        See `Smoothing`.
+    values : (n, 3) float
+        What the texels gathered [W/m²].
+    noise : (n, 3) float
+        A sample of its noise [W/m²].
+    """
+    grid, scratch, count = _Grid(geometry, alike, threads), geometry.scratch, len(alike)
+    start = columns([values, noise], scratch)
+    current, done = start, 0
+    least, passes = scratch.empty(count, np.float32), np.zeros(count, dtype=np.uint8)
+    for wanted in (0, *PASSES):
+        for _ in range(wanted - done):
+            current = grid.weighed(_FITS, current)
+        done = wanted
+        risk = scratch.empty((count, 1), np.float32)
+        for rows in tiles(count):
+            risk[rows, 0] = _risk(start[rows], current[rows])
+        for _ in range(RISK_PASSES):
+            risk = grid.weighed(_MEANS, risk)
+        for rows in tiles(count):
+            better = (risk[rows, 0] < least[rows]) | (wanted == 0)
+            passes[rows][better], least[rows][better] = wanted, risk[rows, 0][better]
+    return Smoothing(alike, passes)
+
+
+def _risk(start: Array, current: Array) -> Array:
+    """Return (r,) estimates of the squared error of values and noise (r, 6), before and after some passes."""
+    square, left = (current - start) ** 2, current[:, 3:] ** 2
+    return np.asarray((square[:, :3] - square[:, 3:] + left).sum(axis=1))
+
+
+def columns(parts: Sequence[Array], scratch: Scratch) -> Array:
+    """Return (n, 3 k) float32: k arrays (n, 3) side by side."""
+    result = scratch.empty((len(parts[0]), 3 * len(parts)), np.float32)
+    for rows in tiles(len(result)):
+        for number, part in enumerate(parts):
+            result[rows, 3 * number : 3 * number + 3] = part[rows]
+    return result
+
+
+def alike_neighbors(
+    geometry: TexelGeometry, caster: RayCaster, alone: Array, scratch: Scratch, threads: int = 0
+) -> Array:
+    """Return (n,) uint8: which neighbors on the page, bit by bit, continue a texel's surface and see it.
+
+    alone (n,): Texels that have none.
+    """
+    numbers = _Grid(geometry, None, threads)
+    found = scratch.empty(len(geometry), np.uint8)
+    single = alone if geometry.shared is None else alone | (geometry.shared.number >= 0)
+    width = np.sqrt(geometry.texel_area)
+    fill_chunks(
+        partial(_alike, geometry, caster, single, width, numbers), found, len(geometry), CHUNK, threads
+    )
+    return found
+
+
+def _alike(
+    geometry: TexelGeometry, caster: RayCaster, single: Array, width: Array, grid: _Grid, rows: slice
+) -> Array:
+    """Return (r,) uint8 the neighbors of a run of texels."""
+    texel = np.arange(rows.start, rows.stop)
+    position, normal = geometry.position[rows], geometry.normal[rows]
+    found = np.zeros(len(texel), dtype=np.uint8)
+    lift = SIGHT_LIFT * caster.surface_offset
+    for bit, step in enumerate(_STEPS):
+        other = grid.neighbor(rows, step)
+        pair = np.flatnonzero((other >= 0) & ~single[rows])
+        pair = pair[~single[other[pair]]]
+        far = other[pair]
+        along = geometry.position[far] - position[pair]
+        distance = np.linalg.norm(along, axis=1)
+        stride = width[geometry.triangle[texel[pair]]] * np.hypot(*step)
+        facing = np.einsum("pk,pk->p", normal[pair], geometry.normal[far])
+        height = np.abs(np.einsum("pk,pk->p", along, geometry.surface_normal[texel[pair]]))
+        near = np.flatnonzero(
+            (distance < APART * stride) & (facing > ALIKE) & (height < OFF_PLANE * stride) & (distance > 0)
+        )
+        pair, far, facing, distance = pair[near], far[near], facing[near], distance[near]
+        rise = (lift + SAGITTA * distance * np.sqrt(np.maximum(1.0 - facing, 0.0)))[:, None]
+        way = along[near] + rise * (geometry.normal[far] - normal[pair])
+        length = np.linalg.norm(way, axis=1)
+        free = caster.unoccluded(position[pair] + rise * normal[pair], way / length[:, None], length)
+        found[pair[free]] |= np.uint8(1 << bit)
+    return found
+
+
+class _Grid:
+    """Texels by their places on the pages, and sums over those that belong together."""
+
+    def __init__(self, geometry: TexelGeometry, alike: Array | None, threads: int) -> None:
+        self._alike, self._threads, self._scratch = alike, threads, geometry.scratch
+        # A rim of no texels around each page.
+        widths = [len(page) + 2 for page in geometry.index]
+        first = np.cumsum([0] + [width * width for width in widths])
+        self._number = np.full(int(first[-1]), -1, dtype=np.int32)
+        self._place = np.empty(len(geometry), dtype=np.int64)
+        self._width = np.empty(len(geometry), dtype=np.int32)
+        for width, start, page in zip(widths, first, geometry.index, strict=False):
+            padded = self._number[start : start + width * width].reshape(width, width)
+            padded[1:-1, 1:-1] = page
+            row, column = np.nonzero(page >= 0)
+            texel = page[row, column]
+            self._place[texel] = start + (row + 1) * width + column + 1
+            self._width[texel] = width
+
+    def neighbor(self, rows: slice, step: Array) -> Array:
+        """Return (r,) the texels one step away on the page, or −1."""
+        return np.asarray(self._number[self._place[rows] + step[0] * self._width[rows] + step[1]])
+
+    def weighed(self, weights: Array, values: Array) -> Array:
+        """Return (n, k) float32: sums over texels and their neighbors by (256, 9) weights."""
+        result = self._scratch.empty(values.shape, np.float32)
+        fill_chunks(partial(_weighed, self, weights, values), result, len(values), CHUNK, self._threads)
+        return result
+
+    def sums(self, weights: Array, values: Array, rows: slice) -> Array:
+        """Return (r, k) float32 the sums of a run of texels."""
+        assert self._alike is not None
+        alike = self._alike[rows]
+        weight = weights[alike]
+        result = weight[:, :1] * values[rows]
+        for bit, step in enumerate(_STEPS):
+            has = np.flatnonzero(alike & (1 << bit))
+            other = self.neighbor(rows, step)[has]
+            result[has] += weight[has, bit + 1, None] * values[other]
+        return result
+
+
+def _weighed(grid: _Grid, weights: Array, values: Array, rows: slice) -> Array:
+    return grid.sums(weights, values, rows)
