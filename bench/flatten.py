@@ -17,8 +17,8 @@ from radiosity_addon.scene.scene import Scene
 
 from .interior.blender_parts import even_sky
 
-MANY_KINDS = 256
-"""Of an object's surfaces; if there are more, reflectances are rounded to 0.05."""
+MOST_MATERIALS = 1000
+"""If a scene has more colors, reflectances are rounded: Cycles needs minutes for each pass with so many."""
 
 
 def flatten(sky: tuple[float, float, float] | None) -> None:
@@ -36,23 +36,25 @@ def flatten(sky: tuple[float, float, float] | None) -> None:
     for lamp, place in zip(lamps, places, strict=True):
         lamp.parent = None
         lamp.matrix_world = place
+    colors = _colors(solved)
     materials: dict[tuple[float, ...], bpy.types.Material] = {}
     for item in bake_scene.objects:
         if item.count:
-            _add(scene, item, solved, materials)
+            _add(scene, item, solved, colors, materials)
 
 
 def _add(
     scene: bpy.types.Scene,
     item: BakeObject,
     solved: Scene,
+    colors: np.ndarray,
     materials: dict[tuple[float, ...], bpy.types.Material],
 ) -> None:
     triangles = solved.triangles[item.rows]
     mesh = bpy.data.meshes.new(item.name)
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)
     mesh.from_pydata(triangles.reshape(-1, 3).tolist(), [], faces.tolist())
-    kinds, which = _kinds(solved.reflectance[item.rows], solved.emission[item.rows])
+    kinds, which = np.unique(colors[item.rows], axis=0, return_inverse=True)
     for kind in kinds:
         mesh.materials.append(_material(tuple(float(v) for v in kind), materials))
     mesh.polygons.foreach_set("material_index", which.ravel().astype(np.int32))
@@ -64,15 +66,13 @@ def _add(
     scene.collection.objects.link(bpy.data.objects.new(item.name, mesh))
 
 
-def _kinds(reflectance: np.ndarray, emission: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (k, 6) distinct reflectances and emissions [W/m²], and which of them each triangle has."""
-    surfaces = np.concatenate([np.round(reflectance, 6), np.round(emission, 6)], axis=1)
-    kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
-    if len(kinds) > MANY_KINDS:
-        # Textures: every triangle has a mean of its own, and a material each would take hours.
-        surfaces[:, :3] = np.round(20.0 * reflectance) / 20.0
-        kinds, which = np.unique(surfaces, axis=0, return_inverse=True)
-    return kinds, which
+def _colors(solved: Scene) -> np.ndarray:
+    """Return (t, 6) the reflectances and emissions [W/m²] of triangles."""
+    colors = np.round(np.concatenate([solved.reflectance, solved.emission], axis=1), 6)
+    if len(np.unique(colors, axis=0)) > MOST_MATERIALS:
+        # Textures: every triangle has a mean of its own.
+        colors[:, :3] = np.round(32.0 * colors[:, :3]) / 32.0
+    return colors
 
 
 def _material(
