@@ -4,7 +4,7 @@ The light that neighboring texels gather differs by their noise and by little el
 3 × 3 local linear fit, applied again and again, averages over more and more texels and keeps what is
 linear. How often is decided texel by texel, by an estimate of the squared error: what the fits change beyond
 what they change of the noise itself is bias, and what they leave of the noise is variance (Stein's unbiased
-what they change of the noise itself is bias, and what they leave of the noise is variance (Stein's unbiased risk
+risk estimate; Li, Wu and Chuang, SURE-based optimization for adaptive sampling and reconstruction, 2012).
 The choice is kept: for other light the operator is the same, and so it is linear.
 """
 
