@@ -1,11 +1,11 @@
 """Noise of gathered light shared between texels of one surface that see each other.
 
-The light that neighboring texels gather differs by their noise and by little else, except where it bends. A
-3 × 3 local linear fit, applied again and again, averages over more and more texels and keeps what is
-linear. How often is decided texel by texel, by an estimate of the squared error: what the fits change beyond
-what they change of the noise itself is bias, and what they leave of the noise is variance (Stein's unbiased
-risk estimate; Li, Wu and Chuang, SURE-based optimization for adaptive sampling and reconstruction, 2012).
-The choice is kept: for other light the operator is the same, and so it is linear.
+The light that neighboring texels gather differs by their noise and by little else, except where it bends.
+Steps of diffusion over 3 × 3 texels average over more and more of them. How many a texel takes is decided
+texel by texel, by an estimate of the squared error: what the steps change beyond what they change of the
+noise itself is bias, and what they leave of the noise is variance (Stein's unbiased risk estimate; Li, Wu and
+Chuang, SURE-based optimization for adaptive sampling and reconstruction, 2012). The choice is kept: for
+other light the operator is the same, and so it is linear.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ..texels import TexelGeometry
 
 PASSES = (1, 2, 4, 8, 16)
-"""How often the fit may be applied to a texel, besides not at all."""
+"""Steps that a texel may take, besides none."""
 
 RISK_PASSES = 4
 """Means over 3 × 3 texels that the estimate of the squared error is averaged by."""
@@ -31,8 +31,8 @@ APART, ALIKE, OFF_PLANE = 1.6, 0.9, 0.35
 steps of the page, their normals have this cosine at least, and they are this part of a step off each other's
 plane at most."""
 
-DAMPING = 0.02
-"""Pull of the fitted slopes toward zero."""
+BIAS = 2.0
+"""What the bias counts: it shows where noise does not, at shadows."""
 
 CHUNK = 1 << 14
 """Texels smoothed at once; bounds the temporaries to about 10 MB a thread."""
@@ -41,25 +41,25 @@ _STEPS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (
 """(8, 2): rows and columns from a texel to its neighbors."""
 
 
-def _fits() -> Array:
-    """Return (256, 9) weights of the linear fit: of the texel and the neighbors that a number's bits name."""
-    there = np.concatenate([np.ones((256, 1)), (np.arange(256)[:, None] >> np.arange(8)) & 1], axis=1)
-    steps = np.concatenate([np.zeros((1, 2)), _STEPS])
-    weight = there * 0.5 ** np.abs(steps).sum(axis=1)
-    basis = np.concatenate([np.ones((9, 1)), steps], axis=1)
-    system = np.einsum("nk,ka,kb->nab", weight, basis, basis)
-    slopes = np.arange(1, 3)
-    system[:, slopes, slopes] += DAMPING * weight.sum(axis=1, keepdims=True)
-    return np.asarray(weight * (np.linalg.inv(system)[:, 0] @ basis.T)).astype(np.float32)
+_THERE = (np.arange(256)[:, None] >> np.arange(8)) & 1
+
+
+def _diffusion() -> Array:
+    """Return (256, 9) weights of a step: of the texel and the neighbors that a number's bits name.
+
+    Two texels give each other the same part, so that no light is lost.
+    """
+    given = _THERE * 0.25 * 0.5 ** np.abs(_STEPS).sum(axis=1)
+    return np.concatenate([1.0 - given.sum(axis=1, keepdims=True), given], axis=1).astype(np.float32)
 
 
 def _means() -> Array:
     """Return (256, 9) weights of the mean over a texel and the neighbors that a number's bits name."""
-    there = np.concatenate([np.ones((256, 1)), (np.arange(256)[:, None] >> np.arange(8)) & 1], axis=1)
+    there = np.concatenate([np.ones((256, 1)), _THERE], axis=1)
     return np.asarray(there / there.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
-_FITS, _MEANS = _fits(), _means()
+_DIFFUSION, _MEANS = _diffusion(), _means()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Smoothing:
     alike : (n,) uint8
         Which of the eight neighbors on the page, bit by bit, belong to a texel.
     passes : (n,) uint8
-        How often the fit is applied.
+        Its steps.
     """
 
     alike: Array
@@ -89,7 +89,7 @@ class Smoothing:
             if passes > most:
                 break
             for _ in range(passes - done):
-                current = grid.weighed(_FITS, current)
+                current = grid.weighed(_DIFFUSION, current)
             done = passes
             for rows in tiles(len(values)):
                 chosen = self.passes[rows] == passes
@@ -100,7 +100,7 @@ class Smoothing:
 def choose_smoothing(
     geometry: TexelGeometry, alike: Array, values: Array, noise: Array, threads: int = 0
 ) -> Smoothing:
-    """Choose how often the fit is applied to each texel.
+    """Choose how many steps each texel takes.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def choose_smoothing(
     least, passes = scratch.empty(count, np.float32), np.zeros(count, dtype=np.uint8)
     for wanted in (0, *PASSES):
         for _ in range(wanted - done):
-            current = grid.weighed(_FITS, current)
+            current = grid.weighed(_DIFFUSION, current)
         done = wanted
         risk = scratch.empty((count, 1), np.float32)
         for rows in tiles(count):
@@ -131,9 +131,9 @@ def choose_smoothing(
 
 
 def _risk(start: Array, current: Array) -> Array:
-    """Return (r,) estimates of the squared error of values and noise (r, 6), before and after some passes."""
+    """Return (r,) estimates of the squared error of values and noise (r, 6), before and after some steps."""
     square, left = (current - start) ** 2, current[:, 3:] ** 2
-    return np.asarray((square[:, :3] - square[:, 3:] + left).sum(axis=1))
+    return np.asarray((BIAS * (square[:, :3] - square[:, 3:]) + left).sum(axis=1))
 
 
 def columns(parts: Sequence[Array], scratch: Scratch) -> Array:
