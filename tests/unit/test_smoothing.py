@@ -1,4 +1,4 @@
-"""Noise shared between texels: nothing is lost, features stay, and what does not see each other stays apart."""
+"""Noise shared between texels: no light is lost, edges stay, and walls keep texels apart."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...numerics import Array, Scratch, fill_chunks, tiles
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
-from ..texels import TexelGeometry
+from ..texels import NO_TEXEL, TexelGeometry
 
 PASSES = (1, 2, 4, 8, 16)
 """Steps that a texel may take, besides none."""
@@ -33,6 +33,9 @@ plane at most."""
 
 BIAS = 2.0
 """What the bias counts: it shows where noise does not, at shadows."""
+
+BAND = 1 << 20
+"""Pixels whose texels are placed at once; bounds the temporaries to 20 MB."""
 
 CHUNK = 1 << 14
 """Texels smoothed at once; bounds the temporaries to about 10 MB a thread."""
@@ -198,22 +201,24 @@ class _Grid:
     def __init__(self, geometry: TexelGeometry, alike: Array | None, threads: int) -> None:
         self._alike, self._threads, self._scratch = alike, threads, geometry.scratch
         # A rim of no texels around each page.
-        widths = [len(page) + 2 for page in geometry.index]
-        first = np.cumsum([0] + [width * width for width in widths])
-        self._number = np.full(int(first[-1]), -1, dtype=np.int32)
-        self._place = np.empty(len(geometry), dtype=np.int64)
-        self._width = np.empty(len(geometry), dtype=np.int32)
-        for width, start, page in zip(widths, first, geometry.index, strict=False):
+        self._width = np.array([len(page) + 2 for page in geometry.index], dtype=np.int64)
+        first = np.cumsum([0, *self._width**2])
+        self._page = geometry.page
+        self._number = self._scratch.empty(int(first[-1]), np.int32)
+        self._place = self._scratch.empty(len(geometry), np.int64)
+        for width, start, page in zip(self._width, first, geometry.index, strict=False):
             padded = self._number[start : start + width * width].reshape(width, width)
-            padded[1:-1, 1:-1] = page
-            row, column = np.nonzero(page >= 0)
-            texel = page[row, column]
-            self._place[texel] = start + (row + 1) * width + column + 1
-            self._width[texel] = width
+            padded[[0, -1]] = padded[:, [0, -1]] = NO_TEXEL
+            for band in tiles(len(page), max(BAND // len(page), 1)):
+                padded[1:-1][band, 1:-1] = page[band]
+                row, column = np.nonzero(page[band] != NO_TEXEL)
+                texel = page[band][row, column]
+                self._place[texel] = start + (row + band.start + 1) * width + column + 1
 
     def neighbor(self, rows: slice, step: Array) -> Array:
         """Return (r,) the texels one step away on the page, or −1."""
-        return np.asarray(self._number[self._place[rows] + step[0] * self._width[rows] + step[1]])
+        below = step[0] * self._width[self._page[rows]]
+        return np.asarray(self._number[self._place[rows] + below + step[1]])
 
     def weighed(self, weights: Array, values: Array) -> Array:
         """Return (n, k) float32: sums over texels and their neighbors by (256, 9) weights."""
