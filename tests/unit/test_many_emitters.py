@@ -106,6 +106,19 @@ def test_groups_send_what_their_faces_send(shape: str, rms: float, monkeypatch: 
     assert len(tree.ask(points, normals).row) < 0.1 * len(points) * len(triangles)
 
 
+@pytest.mark.parametrize("many", [64, 10**9])
+def test_a_bulb_that_glows_on_both_sides_does_not_light_itself(
+    many: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Points are rounded a hair behind their own faces, where those faces' backs are in front of them."""
+    outside = bulb()
+    lamp = group(np.concatenate([outside, outside[:, [0, 2, 1]]]), many, monkeypatch)
+    normals = normals_of(outside)
+    for behind in (-1e-9, 0.0, 1e-9):
+        own = lamp.unit_irradiance(outside.mean(axis=1) - behind * normals, normals)
+        assert own.max() < 1e-3
+
+
 def test_what_a_point_gets_does_not_depend_on_who_asks_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     points, normals = places(500, 0.4)
     lamp = group(bulb(), 64, monkeypatch)

@@ -66,9 +66,12 @@ class EmitterTree:
     corners (m, 3, 3).
     normals (m, 3).
     weight (m,) [m²]: Areas, times what part of the lamp's strength each face emits.
+    lift: Points count as lying so far above their surfaces [m]: one that is rounded a hair behind its own would
+        see all of that surface's back.
     """
 
-    def __init__(self, corners: Array, normals: Array, weight: Array) -> None:
+    def __init__(self, corners: Array, normals: Array, weight: Array, lift: float = 0.0) -> None:
+        self._lift = lift
         self.order, levels = _sorted_tree(corners.mean(axis=1), normals)
         """(m,) int: the faces by their place in the tree: every node holds a run of them"""
         corners, normals, weight = corners[self.order], normals[self.order], weight[self.order]
@@ -165,7 +168,7 @@ class EmitterTree:
             rows.append(row[done])
             nodes.append(node[done])
             factors.append(_disk_factor(-height[done], front[done], distance[done], self._vector[node[done]]))
-            done = np.flatnonzero(seen & settled & ~simple)
+            done = self._in_front(row, node, np.flatnonzero(seen & settled & ~simple), front, normals)
             rows.append(row[done])
             nodes.append(node[done])
             factors.append(self._closed(points, normals, row[done], node[done]))
@@ -187,6 +190,13 @@ class EmitterTree:
         lit = np.flatnonzero(factor > 0)
         lit = lit[np.argsort(row[lit], kind="stable")]
         return EmitterPairs(row[lit], node[lit], factor[lit])
+
+    def _in_front(self, row: Array, node: Array, pairs: Array, front: Array, normals: Array) -> Array:
+        """Return those of some pairs whose lifted points are in front of their nodes, if these are flat."""
+        facing = self.facing.take(node[pairs], axis=0)
+        rise = np.einsum("pk,pk->p", normals.take(row[pairs], axis=0), facing)
+        flat = self._slant[node[pairs]] <= FLAT_SINE
+        return np.asarray(pairs[~flat | (front[pairs] + self._lift * rise > 0.0)])
 
     def descend(self, points: Array, node: Array, u: Array) -> tuple[Array, Array, Array]:
         """Choose below nodes that send by a table one that does not, in proportion to what it sends.

@@ -88,7 +88,7 @@ class EmitterGroup:
         self._radius, self._size = radius.astype(np.float32), self._areas.astype(np.float32)
         self._tree = None
         if len(corners) > MANY:
-            self._tree = EmitterTree(corners, normals, self._areas * self._level)
+            self._tree = EmitterTree(corners, normals, self._areas * self._level, offset / ENDS)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
