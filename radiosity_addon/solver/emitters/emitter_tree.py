@@ -66,7 +66,7 @@ class EmitterTree:
     corners (m, 3, 3).
     normals (m, 3).
     weight (m,) [m²]: Areas, times what part of the lamp's strength each face emits.
-    lift: Points count as lying so far above their surfaces [m]: one that is rounded a hair behind its own would
+    lift: Points count as lying so far above their surfaces [m]: one that is rounded behind its own would
         see all of that surface's back.
     """
 
