@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.scene_diff import Part, compare, scene_record
 from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
+from radiosity_addon.lightmap.points import smoothing
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from tests.glass_rooms import SCREEN_COLOR, glazed_room
@@ -23,6 +25,14 @@ SETTINGS = BakeSettings(resolution=64, quality="draft")
 
 BOX = slice(16, 28)
 """The triangles of the box."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _noise_is_not_shared() -> Iterator[None]:
+    """How noise is shared depends on the light it was chosen for (`test_relit_noise.py`)."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(smoothing, "PASSES", ())
+        yield
 
 
 @pytest.fixture(scope="module")

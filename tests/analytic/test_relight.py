@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,7 @@ from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.lightmap.points import smoothing
 from radiosity_addon.lightmap.transport.warm_start import WarmStart
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -46,6 +48,14 @@ def relative(found: np.ndarray, expected: np.ndarray) -> float:
 
 def only(*rows: int) -> np.ndarray:
     return np.isin(np.arange(len(BAKED)), rows)[:, None]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _noise_is_not_shared() -> Iterator[None]:
+    """How noise is shared depends on the light it was chosen for (`test_relit_noise.py`)."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(smoothing, "PASSES", ())
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -232,8 +232,9 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
     _check_gains(instance(lit.gains, LightGains), texels, lamps)
     integers(lit.element, (texels,), NOTHING, elements - 1)
     smoothing = instance(lit.smoothing, Smoothing)
-    integers(smoothing.alike, (texels,), 0, 255)
-    integers(smoothing.passes, (texels,), 0, PASSES[-1])
+    for steps in (smoothing.alike, smoothing.passes):
+        array_of(steps, "u", (texels,))
+    require(int(smoothing.passes.max(initial=0)) <= PASSES[-1], "too many steps")
     whole(lit.sweeps, 0, MOST_ROUNDS)
     number(lit.tolerance, 0.0)
     known = instance(instance(lit.warm_start, WarmStart).solutions, list)

@@ -227,7 +227,7 @@ def sweep(
                 gathered[rows] += indirect[rows]
             smoothing = choose_smoothing(smooth.geometry, smooth.alike, gathered, noise, threads)
     if smooth is not None and smoothing is not None:
-        parts = [indirect] if noise is None else [indirect, noise]
+        parts = [indirect]
         if beyond.any():
             parts.append(_difference(direct, lamps, scratch))
         shared = smoothing(smooth.geometry, columns(parts, scratch), threads)
@@ -235,7 +235,6 @@ def sweep(
             indirect[rows] = np.maximum(shared[rows, :3], 0.0)
             if beyond.any():
                 direct[rows] = lamps[rows] + np.maximum(shared[rows, -3:], 0.0)
-        noise = None if noise is None else shared[:, 3:6]
     if noise is None:
         return TexelLight(direct, indirect, 0.0, table[:surfaces], smoothing=smoothing)
     error = relative_error(noise, direct, indirect)
