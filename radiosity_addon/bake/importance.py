@@ -123,15 +123,20 @@ def scales_of(bake_scene: BakeScene, baked: Sequence[BakeObject], settings: Bake
     )
 
 
-def thinned_out(names: Sequence[str], scales: Sequence[float]) -> list[BakeWarning]:
-    """Name the objects that got fewer texels, with the scale that was used."""
+def thinned_out(names: Sequence[str], scales: Sequence[float], texels: Sequence[float]) -> list[BakeWarning]:
+    """Name the objects that got fewer texels, with the scale that was used and the share they still take.
+
+    texels: Of each, in any unit.
+    """
+    total = max(sum(texels), 1e-300)
     return [
         BakeWarning(
             name,
             f"object '{name}' reaches far beyond the others and would take most texels: it gets a Texel "
-            f"Scale of {scale:.2g}; set its Texel Scale, or a texel density, to choose for yourself",
+            f"Scale of {scale:.2g} and {own / total:.0%} of the texels; set its Texel Scale, or a texel "
+            "density, to choose for yourself",
         )
-        for name, scale in zip(names, scales, strict=True)
+        for name, scale, own in zip(names, scales, texels, strict=True)
         if scale < 1.0
     ]
 

@@ -38,7 +38,11 @@ def lay_out(
         settings.threads,
     )
     atlas = build_atlas(inputs, options, progress)
-    thinned = thinned_out([item.name for item in baked], scales)
+    texels = [
+        float(scene.areas[item.rows][item.lit].sum()) * (item.texel_scale * scale) ** 2
+        for item, scale in zip(baked, scales, strict=True)
+    ]
+    thinned = thinned_out([item.name for item in baked], scales, texels)
     placed = [_with_glass(item, each) for item, each in zip(baked, atlas.objects, strict=True)]
     return replace(atlas, objects=tuple(placed), warnings=(*thinned, *atlas.warnings))
 

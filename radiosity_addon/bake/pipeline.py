@@ -52,6 +52,7 @@ from .result import (
     TexelPictures,
     more_of,
     object_density,
+    share_of_page,
     solver_part,
 )
 from .stages import StageTimes, timed
@@ -215,7 +216,13 @@ def finish(
     coincident = coincident_counts(baked, bake_scene.scene)
     warnings = (*bake_scene.warnings, *of_texels, *of_coincident(coincident), *solved.warnings)
     objects = tuple(
-        BakedObject(item, placed.uv, placed.page, object_density(geometry, item))
+        BakedObject(
+            item,
+            placed.uv,
+            placed.page,
+            object_density(geometry, item),
+            share_of_page(geometry, item, placed.page),
+        )
         for item, placed in zip(baked, atlas.objects, strict=True)
     )
     light, details = more

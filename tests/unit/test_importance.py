@@ -101,9 +101,10 @@ def test_the_estimate_knows_and_names_it() -> None:
     thinned = estimate_bake(objects(), 202, BakeSettings(resolution=512))
     assert thinned.thinned[:8] == (1.0,) * 8
     assert thinned.densities[0] > 4.0 * thinned.densities[8]
-    (warning,) = thinned_out([item.name for item in objects()], thinned.thinned)
+    (warning,) = thinned_out([item.name for item in objects()], thinned.thinned, thinned.texels)
     assert warning.name == "ground"
     assert f"{thinned.thinned[8]:.2g}" in warning.message
+    assert f"{thinned.texels[8] / sum(thinned.texels):.0%}" in warning.message
 
 
 @pytest.mark.parametrize("given", [{"texel_density": 10.0}, {"atlas": "per-object"}])

@@ -38,7 +38,8 @@ def _report(files: tuple[LightmapFile, ...]) -> BakeReport:
     )
     names = ("Wände", "B")
     baked = tuple(
-        SimpleNamespace(object=SimpleNamespace(name=n), page=i, density=64.0) for i, n in enumerate(names)
+        SimpleNamespace(object=SimpleNamespace(name=n), page=i, density=64.0, share=0.5)
+        for i, n in enumerate(names)
     )
     result = BakeResult(pages, baked, SOLVER, (BakeWarning("B", "something is odd"),))
     return BakeReport.of(result, files, {"export": 0.123456, "solve": 2})
@@ -50,7 +51,7 @@ def test_the_file_holds_what_the_format_promises(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
     read = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert read == report.as_dict()
-    of_each = {"uv_layer": "Lightmap", "texels_per_metre": 64.0}
+    of_each = {"uv_layer": "Lightmap", "texels_per_metre": 64.0, "share_of_page": 0.5}
     assert read == {
         "version": 2,
         "objects": [

@@ -5,7 +5,7 @@ Plain records and files, nothing that bakes.
 
 from __future__ import annotations
 
-from .details import MEANS, More, more_of, object_density, statistics
+from .details import MEANS, More, more_of, object_density, share_of_page, statistics
 from .history_plot import write_history
 from .pictures import Picture, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
@@ -28,6 +28,7 @@ __all__ = [
     "TexelSurfaces",
     "more_of",
     "object_density",
+    "share_of_page",
     "solver_part",
     "statistics",
     "write_history",

@@ -140,6 +140,12 @@ def object_density(geometry: TexelGeometry, item: BakeObject) -> float | None:
     return float(density[order[np.searchsorted(surface, 0.5 * surface[-1])]])
 
 
+def share_of_page(geometry: TexelGeometry, item: BakeObject, page: int) -> float:
+    """Return what part of a page's texels belongs to an object."""
+    count = geometry.page_start[page + 1] - geometry.page_start[page]
+    return float(geometry.counts[item.rows].sum() / max(count, 1))
+
+
 def lit_values(
     texels: Array, parts: Sequence[Array], geometry: TexelGeometry, state: Array
 ) -> tuple[Array, Array, Array]:

@@ -85,6 +85,8 @@ class BakeReport:
                 entry["scale"] = file.scale
             if baked.density is not None:
                 entry["texels_per_metre"] = baked.density
+            if baked.share is not None:
+                entry["share_of_page"] = baked.share
             if baked.object.name in result.coincident:
                 entry["coincident_triangles"] = result.coincident[baked.object.name]
             objects.append({**entry, **_plain(of_light)})

@@ -32,12 +32,14 @@ class BakedObject:
     uv (count, 3, 2) float32: Per triangle corner, in [0, 1], v up.
     page: Index into `BakeResult.pages`.
     density: Texels per meter, the median over its surface; None if it is not known.
+    share: What part of its page's used texels it has; None if it is not known.
     """
 
     object: BakeObject
     uv: Array
     page: int
     density: float | None = None
+    share: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -283,7 +283,7 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
     ]
     names = [item.name for item in lit]
     greedy = greedy_object(names, plan.texels)
-    for warning in thinned_out(names, plan.thinned):
+    for warning in thinned_out(names, plan.thinned, plan.texels):
         yield Finding(WARNING, warning.name, warning.message)
     if tiny:
         advice = (

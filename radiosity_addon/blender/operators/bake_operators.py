@@ -98,7 +98,10 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
         if context.scene.radiosity.lightmap_only:
             set_lightmap_only(True)
         taken = sum(report["seconds"].values())
-        self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
+        baked = {entry["object"] for entry in report["objects"]}
+        glass = sum(name not in baked for name in report["solver"].get("glass", ()))
+        left_out = f" ({glass} of glass have no lightmap)" if glass else ""
+        self.report({"INFO"}, f"Baked {len(baked)} objects in {taken:.1f} s{left_out}")
         warnings = one_of_each(report["warnings"])
         for warning in warnings[:3]:
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
