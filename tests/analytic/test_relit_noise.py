@@ -12,7 +12,8 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from tests.relit_rooms import BAKED, CHANGED, lit_bake
 
 SETTINGS = BakeSettings(resolution=64, quality="draft")
-SKY, EMISSION = (np.isin(np.arange(len(BAKED)), rows)[:, None] for rows in ((2,), (4, 5)))
+DARK, SKY, EMISSION = (np.isin(np.arange(len(BAKED)), rows)[:, None] for rows in ((1,), (2,), (4, 5)))
+"""The lamp that was dark when the room was baked, the sky, and what glows."""
 
 
 def pixels(pages: tuple[LightmapPage, ...]) -> np.ndarray:
@@ -28,8 +29,15 @@ def room() -> KeptBake:
     return bake_and_keep(lit_bake(), SETTINGS)[1]
 
 
+def test_the_baked_light_gives_the_baked_lightmap() -> None:
+    result, kept = bake_and_keep(lit_bake(), SETTINGS)
+    assert relative(pixels(relight_pages(kept, BAKED)), pixels(result.pages)) < kept.lit.tolerance
+
+
 @pytest.mark.parametrize(
-    "strengths", [CHANGED, BAKED * SKY, BAKED * EMISSION], ids=["all changed", "sky alone", "emission alone"]
+    "strengths",
+    [CHANGED, 30.0 * DARK * np.ones(3), BAKED * SKY, BAKED * EMISSION],
+    ids=["all changed", "dark lamp alone", "sky alone", "emission alone"],
 )
 def test_relit_light_is_as_near_to_a_full_bake_as_another_seed(room: KeptBake, strengths: np.ndarray) -> None:
     found = pixels(relight_pages(room, strengths))

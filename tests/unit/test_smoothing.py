@@ -6,7 +6,6 @@ import numpy as np
 
 from radiosity_addon.lightmap.points import Smoothing, alike_neighbors, choose_smoothing
 from radiosity_addon.lightmap.texels import TexelGeometry, rasterize
-from radiosity_addon.numerics import Scratch
 from radiosity_addon.rays import EmbreeCaster
 from tests.rooms import gray_scene, rectangle
 
@@ -25,7 +24,7 @@ def floor(*others: np.ndarray) -> tuple[TexelGeometry, EmbreeCaster]:
 
 
 def neighbors(geometry: TexelGeometry, caster: EmbreeCaster) -> np.ndarray:
-    return alike_neighbors(geometry, caster, np.zeros(len(geometry), dtype=bool), Scratch())
+    return alike_neighbors(geometry, caster, np.zeros(len(geometry), dtype=bool))
 
 
 def test_no_light_is_lost_and_even_light_stays() -> None:
@@ -37,6 +36,27 @@ def test_no_light_is_lost_and_even_light_stays() -> None:
     np.testing.assert_allclose(smooth.sum(axis=0), values.sum(axis=0), rtol=1e-5)
     assert smooth.std() < 0.15 * values.std()
     np.testing.assert_allclose(smoothing(geometry, np.ones_like(values)), 1.0, rtol=1e-6)
+
+
+def test_neighbors_are_mutual() -> None:
+    """Also where texels of two sizes meet."""
+    ground = np.concatenate(
+        [rectangle((0, 0, 0), (0.5, 0, 0), (0, 1, 0)), rectangle((0.5, 0, 0), (0.125, 0, 0), (0, 1, 0))]
+    )
+    scene = gray_scene(ground)
+    uv = ground[..., :2].astype(np.float32)
+    uv[2:, :, 0] = 0.5 + 4.0 * (uv[2:, :, 0] - 0.5)
+    geometry = TexelGeometry(scene, uv, np.zeros(4, dtype=int), [rasterize(uv, SIDE)], [np.arange(4)])
+    alike = neighbors(geometry, EmbreeCaster(scene.triangles))
+    (index,) = geometry.index
+    steps = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+    pairs = 0
+    for bit, (i, j) in enumerate(steps):
+        for row, column in zip(geometry.row, geometry.column, strict=True):
+            if alike[index[row, column]] >> bit & 1:
+                assert alike[index[row + i, column + j]] >> (7 - bit) & 1
+                pairs += 1
+    assert pairs > 4 * len(geometry)
 
 
 def test_noise_is_shared_where_light_is_even_and_an_edge_stays() -> None:

@@ -54,17 +54,8 @@ STORED_CLASSES: tuple[type, ...] = (
     *(PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch),
     *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
     *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks, Balance),
-    *(
-        RelightableTexels,
-        TexelTransport,
-        GatherLinks,
-        AimedRays,
-        Interpolation,
-        SubCells,
-        SubCellLinks,
-        Smoothing,
-    ),
-    *(LightGains, WarmStart, TexelGeometry, Seams),
+    *(RelightableTexels, TexelTransport, GatherLinks, AimedRays, Interpolation, SubCells, SubCellLinks),
+    *(LightGains, WarmStart, Smoothing, TexelGeometry, Seams),
 )
 """The classes that may be stored: those that relighting reads."""
 

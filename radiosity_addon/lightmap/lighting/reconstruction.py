@@ -102,7 +102,7 @@ def light_texels(
         start = _hierarchy_start(local, element, geometry)
     else:
         start, transport = standing.start(transport, rows, element, more)
-    alike = alike_neighbors(geometry, local.caster, crossings.alone, geometry.scratch, local.threads)
+    alike = alike_neighbors(geometry, local.caster, crossings.alone, local.threads)
     light = sweep(
         transport,
         start,

@@ -43,14 +43,14 @@ CHUNK = 1 << 14
 _STEPS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
 """(8, 2): rows and columns from a texel to its neighbors."""
 
-
 _THERE = (np.arange(256)[:, None] >> np.arange(8)) & 1
 
 
 def _diffusion() -> Array:
     """Return (256, 9) weights of a step: of the texel and the neighbors that a number's bits name.
 
-    Two texels give each other the same part, so that no light is lost.
+    Two texels give each other the same part, so that a step of all texels loses no light. Texels that take
+    different numbers of steps lose or gain a little.
     """
     given = _THERE * 0.25 * 0.5 ** np.abs(_STEPS).sum(axis=1)
     return np.concatenate([1.0 - given.sum(axis=1, keepdims=True), given], axis=1).astype(np.float32)
@@ -148,21 +148,19 @@ def columns(parts: Sequence[Array], scratch: Scratch) -> Array:
     return result
 
 
-def alike_neighbors(
-    geometry: TexelGeometry, caster: RayCaster, alone: Array, scratch: Scratch, threads: int = 0
-) -> Array:
+def alike_neighbors(geometry: TexelGeometry, caster: RayCaster, alone: Array, threads: int = 0) -> Array:
     """Return (n,) uint8: which neighbors on the page, bit by bit, continue a texel's surface and see it.
 
     alone (n,): Texels that have none.
     """
-    numbers = _Grid(geometry, None, threads)
-    found = scratch.empty(len(geometry), np.uint8)
+    grid = _Grid(geometry, None, threads)
+    found, mutual = (geometry.scratch.empty(len(geometry), np.uint8) for _ in range(2))
     single = alone if geometry.shared is None else alone | (geometry.shared.number >= 0)
     width = np.sqrt(geometry.texel_area)
-    fill_chunks(
-        partial(_alike, geometry, caster, single, width, numbers), found, len(geometry), CHUNK, threads
-    )
-    return found
+    alike = partial(_alike, geometry, caster, single, width, grid)
+    fill_chunks(alike, found, len(geometry), CHUNK, threads)
+    fill_chunks(partial(grid.mutual, found), mutual, len(geometry), CHUNK, threads)
+    return mutual
 
 
 def _alike(
@@ -223,10 +221,19 @@ class _Grid:
     def weighed(self, weights: Array, values: Array) -> Array:
         """Return (n, k) float32: sums over texels and their neighbors by (256, 9) weights."""
         result = self._scratch.empty(values.shape, np.float32)
-        fill_chunks(partial(_weighed, self, weights, values), result, len(values), CHUNK, self._threads)
+        fill_chunks(partial(self._sums, weights, values), result, len(values), CHUNK, self._threads)
         return result
 
-    def sums(self, weights: Array, values: Array, rows: slice) -> Array:
+    def mutual(self, alike: Array, rows: slice) -> Array:
+        """Return (r,) uint8 those neighbors of a run of texels that have them for neighbors as well."""
+        found = alike[rows].copy()
+        for bit, step in enumerate(_STEPS):
+            # Steps are sorted: the last is the way back from the first.
+            back = alike[self.neighbor(rows, step)] >> (len(_STEPS) - 1 - bit)
+            found &= ~((~back & 1) << bit).astype(np.uint8)
+        return found
+
+    def _sums(self, weights: Array, values: Array, rows: slice) -> Array:
         """Return (r, k) float32 the sums of a run of texels."""
         assert self._alike is not None
         alike = self._alike[rows]
@@ -237,7 +244,3 @@ class _Grid:
             other = self.neighbor(rows, step)[has]
             result[has] += weight[has, bit + 1, None] * values[other]
         return result
-
-
-def _weighed(grid: _Grid, weights: Array, values: Array, rows: slice) -> Array:
-    return grid.sums(weights, values, rows)
