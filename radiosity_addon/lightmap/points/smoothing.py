@@ -157,9 +157,9 @@ def alike_neighbors(geometry: TexelGeometry, caster: RayCaster, alone: Array, th
     found, mutual = (geometry.scratch.empty(len(geometry), np.uint8) for _ in range(2))
     single = alone if geometry.shared is None else alone | (geometry.shared.number >= 0)
     width = np.sqrt(geometry.texel_area)
-    alike = partial(_alike, geometry, caster, single, width, grid)
-    fill_chunks(alike, found, len(geometry), CHUNK, threads)
-    fill_chunks(partial(grid.mutual, found), mutual, len(geometry), CHUNK, threads)
+    candidates = partial(_alike, geometry, caster, single, width, grid)
+    fill_chunks(candidates, found, len(geometry), CHUNK, threads)
+    fill_chunks(partial(_mutual, grid, found), mutual, len(geometry), CHUNK, threads)
     return mutual
 
 
@@ -197,7 +197,7 @@ class _Grid:
     """Texels by their places on the pages, and sums over those that belong together."""
 
     def __init__(self, geometry: TexelGeometry, alike: Array | None, threads: int) -> None:
-        self._alike, self._threads, self._scratch = alike, threads, geometry.scratch
+        self.alike, self._threads, self._scratch = alike, threads, geometry.scratch
         # A rim of no texels around each page.
         self._width = np.array([len(page) + 2 for page in geometry.index], dtype=np.int64)
         first = np.cumsum([0, *self._width**2])
@@ -221,26 +221,28 @@ class _Grid:
     def weighed(self, weights: Array, values: Array) -> Array:
         """Return (n, k) float32: sums over texels and their neighbors by (256, 9) weights."""
         result = self._scratch.empty(values.shape, np.float32)
-        fill_chunks(partial(self._sums, weights, values), result, len(values), CHUNK, self._threads)
+        fill_chunks(partial(_sums, self, weights, values), result, len(values), CHUNK, self._threads)
         return result
 
-    def mutual(self, alike: Array, rows: slice) -> Array:
-        """Return (r,) uint8 those neighbors of a run of texels that have them for neighbors as well."""
-        found = alike[rows].copy()
-        for bit, step in enumerate(_STEPS):
-            # Steps are sorted: the last is the way back from the first.
-            back = alike[self.neighbor(rows, step)] >> (len(_STEPS) - 1 - bit)
-            found &= ~((~back & 1) << bit).astype(np.uint8)
-        return found
 
-    def _sums(self, weights: Array, values: Array, rows: slice) -> Array:
-        """Return (r, k) float32 the sums of a run of texels."""
-        assert self._alike is not None
-        alike = self._alike[rows]
-        weight = weights[alike]
-        result = weight[:, :1] * values[rows]
-        for bit, step in enumerate(_STEPS):
-            has = np.flatnonzero(alike & (1 << bit))
-            other = self.neighbor(rows, step)[has]
-            result[has] += weight[has, bit + 1, None] * values[other]
-        return result
+def _mutual(grid: _Grid, alike: Array, rows: slice) -> Array:
+    """Return (r,) uint8 those neighbors of a run of texels that have them for neighbors as well."""
+    found = alike[rows].copy()
+    for bit, step in enumerate(_STEPS):
+        # Steps are sorted: the last is the way back from the first.
+        back = alike[grid.neighbor(rows, step)] >> (len(_STEPS) - 1 - bit)
+        found &= ~((~back & 1) << bit).astype(np.uint8)
+    return found
+
+
+def _sums(grid: _Grid, weights: Array, values: Array, rows: slice) -> Array:
+    """Return (r, k) float32 the sums of a run of texels."""
+    assert grid.alike is not None
+    there = grid.alike[rows]
+    weight = weights[there]
+    result = weight[:, :1] * values[rows]
+    for bit, step in enumerate(_STEPS):
+        has = np.flatnonzero(there & (1 << bit))
+        other = grid.neighbor(rows, step)[has]
+        result[has] += weight[has, bit + 1, None] * values[other]
+    return result
