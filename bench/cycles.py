@@ -37,6 +37,9 @@ def set_up(scene: bpy.types.Scene, threads: int = 0) -> None:
     for obj in meshes:
         obj.data.uv_layers[LIGHTMAP_UV_LAYER].active = True
     bpy.context.view_layer.objects.active = meshes[0]
+    if len(meshes) > 1:
+        # Cycles prepares the whole scene again for each object it bakes.
+        bpy.ops.object.join()
 
 
 def bake_light(scene: bpy.types.Scene, resolution: int, samples: int, seed: int) -> np.ndarray:
