@@ -9,7 +9,7 @@ two borders. The light of a shared texel is the mean over its pieces, by their a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,9 @@ from .clip import polygon_area_centroid, sample_polygons
 
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """Of a triangle, as weights of its second and third corner."""
+
+CHUNK_TRIANGLES = 1 << 16
+"""Triangles that are cut at once; their temporaries take some ten MB."""
 
 
 class Pieces(NamedTuple):
@@ -58,6 +61,18 @@ def collapsed_pieces(uv: Array, resolution: int) -> Pieces:
 
     uv (n, 3, 2) float32: Triangles in [0, 1]; what is not collapsed or lies outside is left out.
     """
+    found = list(_pieces_in_chunks(uv, resolution))
+    return Pieces(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _pieces_in_chunks(uv: Array, resolution: int) -> Iterator[Pieces]:
+    """Yield the pieces of some triangles at a time, at least once."""
+    for rows in tiles(max(len(uv), 1), CHUNK_TRIANGLES):
+        pieces = _cut_at_texels(uv[rows], resolution)
+        yield pieces._replace(triangle=pieces.triangle + np.int32(rows.start))
+
+
+def _cut_at_texels(uv: Array, resolution: int) -> Pieces:
     place = uv.astype(np.float64) * resolution
     inside = np.isfinite(place).all(axis=(1, 2)) & (place >= 0).all(axis=(1, 2))
     rows = np.flatnonzero(is_collapsed(uv) & inside & (place <= resolution).all(axis=(1, 2)))
@@ -110,14 +125,19 @@ def texel_areas(uv: Array, area: Array, resolution: int) -> Array:
     flat = 0.5 * np.abs(signed_double_areas(uv.astype(np.float64))) * resolution**2
     # Far below what single-precision UVs can enclose, and far enough from 0 for any area.
     found = area / np.maximum(flat, 1e-200)
-    pieces = collapsed_pieces(uv, resolution)
-    if len(pieces.triangle):
-        own = pieces.share * area[pieces.triangle]
-        texel = numbered(pieces.row.astype(np.int64) * resolution + pieces.column)
+    # Without their polygons, which take most of the memory.
+    parts = [
+        (pieces.triangle, pieces.row.astype(np.int64) * resolution + pieces.column, pieces.share)
+        for pieces in _pieces_in_chunks(uv, resolution)
+    ]
+    triangle, texel, share = (np.concatenate(part) for part in zip(*parts, strict=True))
+    if len(triangle):
+        own = share * area[triangle]
+        texel = numbered(texel)
         held = np.bincount(texel, own)[texel]
         # Of the texel that holds its largest piece.
-        order = np.lexsort((held, own, pieces.triangle))
-        found[pieces.triangle[order]] = held[order]
+        order = np.lexsort((held, own, triangle))
+        found[triangle[order]] = held[order]
     return np.asarray(found)
 
 

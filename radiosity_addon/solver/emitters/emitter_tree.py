@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...form_factors import point_to_polygon
-from ...numerics import Array, running_sums, triangle_areas
+from ...numerics import Array, running_sums, tiles, triangle_areas
 from .direction_table import DirectionTable
 
 NEAREST = 3.0
@@ -42,6 +42,9 @@ LEAST_SENT = 1e-3
 
 MOST_TABLES = 512
 """Groups that have a table of directions at most, the largest first: 12 kB each."""
+
+CHUNK_PAIRS = 1 << 14
+"""Pairs that are evaluated in closed form at once; their temporaries take some ten MB."""
 
 THINNEST = 1e-3
 """A rectangle's shorter side, as a part of its longer one, at least."""
@@ -235,9 +238,13 @@ class EmitterTree:
 
     def _closed(self, points: Array, normals: Array, row: Array, node: Array) -> Array:
         """Return (p,) what points get from nodes in closed form."""
-        shapes = self.polygon.take(node, axis=0)
-        factor = point_to_polygon(points.take(row, axis=0), normals.take(row, axis=0), shapes, contact=False)
-        return np.asarray(factor * self._scale.take(node))
+        factor = np.empty(len(row))
+        for pairs in tiles(len(row), CHUNK_PAIRS):
+            point, shape = row[pairs], self.polygon.take(node[pairs], axis=0)
+            factor[pairs] = point_to_polygon(
+                points.take(point, axis=0), normals.take(point, axis=0), shape, contact=False
+            )
+        return factor * self._scale.take(node)
 
 
 def _disk_factor(rise: Array, front: Array, distance: Array, area: Array) -> Array:
