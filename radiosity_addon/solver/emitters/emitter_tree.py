@@ -10,7 +10,7 @@ directions says (`direction_table.py`). Which groups a point uses depends on the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +43,9 @@ LEAST_SENT = 1e-3
 MOST_TABLES = 512
 """Groups that have a table of directions at most, the largest first: 12 kB each."""
 
+MOST_PAIRS = 1 << 17
+"""Pairs of points and nodes that are looked at at once; their temporaries take some 30 MB."""
+
 CHUNK_PAIRS = 1 << 14
 """Pairs that are evaluated in closed form at once; their temporaries take some ten MB."""
 
@@ -50,8 +53,7 @@ THINNEST = 1e-3
 """A rectangle's shorter side, as a part of its longer one, at least."""
 
 
-@dataclass(frozen=True)
-class EmitterPairs:
+class EmitterPairs(NamedTuple):
     """The nodes that light n points: p pairs sorted by point.
 
     row, node (p,) int.
@@ -150,49 +152,58 @@ class EmitterTree:
 
     def ask(self, points: Array, normals: Array) -> EmitterPairs:
         """Return what points (n, 3) that face along `normals` get from nodes that together are all faces."""
-        row, node = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
-        rows, nodes, factors = [], [], []
-        while len(row):
-            along = points.take(row, axis=0) - self.center.take(node, axis=0)
-            distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-            radius = self.radius.take(node)
-            slant = self._slant.take(node) * distance
-            # All below the point's horizon, or all faces turned away: a fan of normals within an angle
-            # and a ball within another are both left behind by the sum of their sines at most.
-            height = np.einsum("pk,pk->p", along, normals.take(row, axis=0))
-            front = np.einsum("pk,pk->p", along, self.facing.take(node, axis=0))
-            seen = (height <= radius) & (front >= -(radius + slant))
-            single = self._single.take(node)
-            whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
-            settled = single | (whole & (radius <= self._smallness.take(node) * distance))
-            far = seen & (distance > FAR * radius) & (height < -radius)
-            simple = far & settled
-            done = np.flatnonzero(simple)
-            rows.append(row[done])
-            nodes.append(node[done])
-            factors.append(_disk_factor(-height[done], front[done], distance[done], self._vector[node[done]]))
-            done = self._in_front(row, node, np.flatnonzero(seen & settled & ~simple), front, normals)
-            rows.append(row[done])
-            nodes.append(node[done])
-            factors.append(self._closed(points, normals, row[done], node[done]))
-            tabled = far & ~settled & (self._table.take(node) >= 0)
-            done = np.flatnonzero(tabled)
-            rows.append(row[done])
-            nodes.append(node[done])
-            facing = normals.take(row[done], axis=0)
-            factors.append(
-                self._tables.factors(
-                    self._table[node[done]], along[done], facing, -height[done], distance[done]
-                )
-            )
-            more = np.flatnonzero(seen & ~settled & ~tabled)
-            child = self._child.take(node[more])
-            row = np.repeat(row[more], 2)
-            node = np.stack([child, child + 1], axis=1).ravel()
-        row, node, factor = np.concatenate(rows), np.concatenate(nodes), np.concatenate(factors)
+        found = []
+        waiting = [(np.arange(len(points)), np.zeros(len(points), dtype=np.int64))]
+        while waiting:
+            row, node = waiting.pop()
+            if len(row) > MOST_PAIRS and row.min() < row.max():
+                # By points: so each meets its nodes in an order that depends on no other.
+                first = row < (row.min() + row.max() + 1) // 2
+                waiting += [(row[~first], node[~first]), (row[first], node[first])]
+                continue
+            done, row, node = self._step_down(points, normals, row, node)
+            found += done
+            if len(row):
+                waiting.append((row, node))
+        row, node, factor = (np.concatenate(part) for part in zip(*found, strict=True))
         lit = np.flatnonzero(factor > 0)
         lit = lit[np.argsort(row[lit], kind="stable")]
         return EmitterPairs(row[lit], node[lit], factor[lit])
+
+    def _step_down(
+        self, points: Array, normals: Array, row: Array, node: Array
+    ) -> tuple[list[EmitterPairs], Array, Array]:
+        """Evaluate the pairs whose nodes may stand for their faces; return them, and the others' children."""
+        along = points.take(row, axis=0) - self.center.take(node, axis=0)
+        distance = np.sqrt(np.einsum("pk,pk->p", along, along))
+        radius = self.radius.take(node)
+        slant = self._slant.take(node) * distance
+        # All below the point's horizon, or all faces turned away: a fan of normals within an angle
+        # and a ball within another are both left behind by the sum of their sines at most.
+        height = np.einsum("pk,pk->p", along, normals.take(row, axis=0))
+        front = np.einsum("pk,pk->p", along, self.facing.take(node, axis=0))
+        seen = (height <= radius) & (front >= -(radius + slant))
+        single = self._single.take(node)
+        whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
+        settled = single | (whole & (radius <= self._smallness.take(node) * distance))
+        far = seen & (distance > FAR * radius) & (height < -radius)
+        simple = far & settled
+        done = np.flatnonzero(simple)
+        factor = _disk_factor(-height[done], front[done], distance[done], self._vector[node[done]])
+        found = [EmitterPairs(row[done], node[done], factor)]
+        done = self._in_front(row, node, np.flatnonzero(seen & settled & ~simple), front, normals)
+        factor = self._closed(points, normals, row[done], node[done])
+        found.append(EmitterPairs(row[done], node[done], factor))
+        tabled = far & ~settled & (self._table.take(node) >= 0)
+        done = np.flatnonzero(tabled)
+        facing = normals.take(row[done], axis=0)
+        factor = self._tables.factors(
+            self._table[node[done]], along[done], facing, -height[done], distance[done]
+        )
+        found.append(EmitterPairs(row[done], node[done], factor))
+        more = np.flatnonzero(seen & ~settled & ~tabled)
+        child = self._child.take(node[more])
+        return found, np.repeat(row[more], 2), np.stack([child, child + 1], axis=1).ravel()
 
     def _in_front(self, row: Array, node: Array, pairs: Array, front: Array, normals: Array) -> Array:
         """Return those of some pairs whose lifted points are in front of their nodes, if these are flat."""
