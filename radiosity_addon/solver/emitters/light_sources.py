@@ -7,6 +7,8 @@ here the groups stay within one source, so that its strength can change alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...base import SceneError
@@ -15,7 +17,7 @@ from ...numerics import Array, numbered
 from ...rays import RayCaster
 from ...scene import Faces, Scene
 from .emitters import EmitterGroup
-from .textured_emitters import emitter_groups
+from .textured_emitters import SAME_COLOR, emitter_groups
 
 NO_SOURCE = -1
 """The source of a triangle that emits nothing."""
@@ -32,7 +34,7 @@ class LightSources:
         [W/m²], the largest of each channel where it varies.
     emitter (t,) int32: The number of each triangle's source less `len(lights)`, or NO_SOURCE.
     owner (g,) int64: The source of each group, likewise.
-    single (s − lights,) bool: Whether what emits has one group, which is of one color.
+    single (s − lights,) bool: Whether all that emits is of one color.
     """
 
     STORED = ("lights", "groups", "strengths", "emitter", "owner", "single")
@@ -54,7 +56,7 @@ class LightSources:
         exitance = np.zeros((count, 3))
         np.maximum.at(exitance, self.emitter[emits], scene.emission[emits])
         self.strengths = np.concatenate([light_strengths(self.lights), exitance])
-        self.single = np.bincount(self.owner, minlength=count) == 1
+        self.single = _of_one_color(self.groups, self.owner, count)
 
     def __len__(self) -> int:
         return len(self.strengths)
@@ -113,6 +115,16 @@ class LightSources:
     def sky(self, strengths: Array) -> SkyTable:
         """Return what rays that leave the scene find."""
         return SkyTable(self.lights, strengths[: len(self.lights)])
+
+
+def _of_one_color(groups: Sequence[EmitterGroup], owner: Array, count: int) -> Array:
+    """Return (count,) bool: the owners of groups (g,) whose strengths are in one proportion."""
+    single = np.zeros(count, dtype=bool)
+    for source in range(count):
+        strengths = [group.strength for group, own in zip(groups, owner, strict=True) if own == source]
+        colors = np.array([strength / strength.max() for strength in strengths])
+        single[source] = len(colors) > 0 and bool((np.ptp(colors, axis=0) <= SAME_COLOR).all())
+    return single
 
 
 def _by_color(scene: Scene) -> Array:

@@ -27,10 +27,20 @@ SAME_COLOR = 1e-3
 def emitter_groups(
     scene: Scene, faces: Faces, caster: RayCaster, among: Array | None = None
 ) -> list[EmitterGroup]:
-    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one color together."""
+    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one color together.
+
+    Fronts and backs are apart: of a bulb one hides the other, and where shadow rays asked both, half of
+    them would be blocked all around it, which is noise.
+    """
+    among = np.ones(len(faces), dtype=bool) if among is None else among
+    sides = (among & faces.front, among & ~faces.front)
+    return [group for side in sides for group in _of_side(scene, faces, caster, side)]
+
+
+def _of_side(scene: Scene, faces: Faces, caster: RayCaster, among: Array) -> list[EmitterGroup]:
+    """Return the emissive ones of some faces as lamps, those of one color together."""
     if scene.images is None:
         return EmitterGroup.of_faces(faces, caster, among)
-    among = np.ones(len(faces), dtype=bool) if among is None else among
     textured = scene.images.textured[faces.triangle]
     plain = EmitterGroup.of_faces(faces, caster, ~textured & among)
     shines = textured & among & (faces.emission.max(axis=1, initial=0.0) > 0)

@@ -36,6 +36,10 @@ FINE = 3.0
 NEAR = 0.5
 """From nearer than this many times its width a large leaf or cell does not answer."""
 
+WIDEST = 8.0
+"""What is wider than this many texels does not answer: a picture that hangs before a wall
+lets lines of sight pass between them, and would darken all of it."""
+
 HOOD = 0.25
 """What is nearer above a large leaf than this part of a texel's width hoods it."""
 
@@ -96,9 +100,10 @@ class ElementCells:
         normal = self._hierarchy.normal_of(leaf)
         position = self._positions(hits) + self._lift(normal)
         size, level = self._size[leaf], np.zeros(len(leaf), dtype=np.int8)
+        distance = np.minimum(hits.distance, NEAR * WIDEST * self._finest)
         for finer in range(MAX_DEPTH):
             level += (
-                (hits.distance * _cells(finer) < NEAR * size)
+                (distance * _cells(finer) < NEAR * size)
                 & self._is_large(leaf)
                 & (self._depth[leaf] > finer)
             )
