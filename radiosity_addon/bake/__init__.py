@@ -13,6 +13,7 @@ from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, p
 from .scene_memory import refuse_many_triangles
 from .stages import timed
 from .texel_memory import pages_of, refuse_large_pages
+from .turned_faces import of_inside_out
 
 __all__ = [
     "SHORT",
@@ -27,6 +28,7 @@ __all__ = [
     "coincident_counts",
     "estimate_bake",
     "of_coincident",
+    "of_inside_out",
     "pages_of",
     "plan_bake",
     "refuse_large_pages",
