@@ -120,7 +120,6 @@ def _bake(
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
-    give_back()  # what the export freed
     refuse_before_unwrapping(bake_scene, settings)
     plan = estimate_of(bake_scene, settings)
     stages = plan.stages

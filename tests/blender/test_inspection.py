@@ -225,6 +225,15 @@ def test_a_black_material_is_worth_knowing(tmp_path: Path) -> None:
     assert [(finding.level, "black" in finding.message) for finding in found] == [(INFO, True)]
 
 
+def test_a_refusal_names_the_memory_that_is_shown(tmp_path: Path) -> None:
+    build_cornell_box()
+    found = look(tmp_path, replace(SETTINGS, memory_limit=0.001, resolution=16))
+    (message,) = (finding.message for finding in found.findings if finding.name == "memory")
+    shown = dict(checks.figures(found))["Memory"]
+    assert shown == f"about {found.estimate.memory / 2**30:.1f} GiB with Blender"
+    assert f"need about {found.estimate.memory / 2**30:.1f} GiB, " in message
+
+
 def test_nothing_to_bake_is_an_error_not_an_exception(tmp_path: Path) -> None:
     add_lamp("POINT", energy=10.0)
     found = look(tmp_path)

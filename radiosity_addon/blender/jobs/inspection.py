@@ -20,6 +20,7 @@ from ...bake import (
     Estimate,
     LightmappedObject,
     estimate_bake,
+    process_bytes,
     refuse_large_pages,
     refuse_many_triangles,
     thinned_out,
@@ -27,9 +28,11 @@ from ...bake import (
 from ...base import RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import folder as scratch_folder
+from ...numerics import give_back
 from ...options import BakeSettings
 from ...scene import LIGHTMAP_UV_LAYER
 from ..apply.rebake import originals_shown
+from ..cycles.surface_evaluation import foreseen_bytes
 from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
@@ -149,7 +152,10 @@ def inspect(
         findings.append(Finding(ERROR, chosen[0].source.name, all_glass(chosen[0].source.name)))
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     faces = lit_sides(collected.pieces, collected)
-    plan = estimate_bake(lit, triangles, settings, faces)
+    give_back()
+    textures = foreseen_bytes(collected.surfaces, settings)
+    plan = estimate_bake(lit, triangles, settings, faces, textures)
+    findings += _of_memory(plan, triangles, faces, textures, settings)
     refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
     if refused is not None:
         findings.append(Finding(ERROR, "file", refused))
@@ -163,7 +169,6 @@ def inspect(
         *_of_texels(lit, plan),
         *_of_scales(collected),
         *_of_size(shapes),
-        *_of_memory(plan, triangles, faces, settings),
         *(Finding(WARNING, warning.name, warning.message) for warning in inside_out_warnings(shown)),
         *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
         *(Finding(INFO, warning.name, warning.message) for warning in coincident_warnings(shown)),
@@ -326,10 +331,12 @@ def _of_size(shapes: dict[int, PieceShape]) -> Iterator[Finding]:
         )
 
 
-def _of_memory(plan: Estimate, triangles: int, faces: int, settings: BakeSettings) -> Iterator[Finding]:
+def _of_memory(
+    plan: Estimate, triangles: int, faces: int, textures: float, settings: BakeSettings
+) -> Iterator[Finding]:
     """Say whether triangles or pages exceed the memory limit, and whether memory or disk may not do."""
     try:
-        refuse_many_triangles(triangles, faces, settings)
+        refuse_many_triangles(triangles, faces, settings, textures)
         refuse_large_pages(plan.pages, settings)
     except RadiosityError as error:
         yield Finding(ERROR, "memory", str(error))
@@ -342,10 +349,10 @@ def _of_memory(plan: Estimate, triangles: int, faces: int, settings: BakeSetting
         if plan.files > disk:
             message += f", where {disk / 1e9:.1f} GB are free: free some, or raise the memory limit"
         yield Finding(WARNING if plan.files > disk else INFO, "memory", message)
-    free = free_memory()
-    if free is not None and plan.memory > free:
+    free, more = free_memory(), plan.memory - process_bytes()
+    if free is not None and more > free:
         message = (
-            f"about {plan.memory / 1e9:.1f} GB will be needed and {free / 1e9:.1f} GB are free: "
+            f"about {more / 2**30:.1f} GiB more will be needed and {free / 2**30:.1f} GiB are free: "
             "lower the resolution or the quality"
         )
         yield Finding(WARNING, "memory", message)
