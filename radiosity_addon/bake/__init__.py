@@ -12,7 +12,8 @@ from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .scene_memory import refuse_many_triangles
 from .stages import timed
-from .texel_memory import pages_of, refuse_large_pages
+from .texel_memory import pages_of, process_bytes, refuse_large_pages
+from .turned_faces import of_inside_out
 
 __all__ = [
     "SHORT",
@@ -27,8 +28,10 @@ __all__ = [
     "coincident_counts",
     "estimate_bake",
     "of_coincident",
+    "of_inside_out",
     "pages_of",
     "plan_bake",
+    "process_bytes",
     "refuse_large_pages",
     "refuse_many_triangles",
     "run_pipeline",

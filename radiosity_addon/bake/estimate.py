@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, page_size
-from ..numerics import Array, thread_count
+from ..numerics import Array, give_back, thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
 from ..solver.state import lit_sides
 from .importance import Extent, justified_scales, may_thin_out
 from .scene_memory import refuse_many_triangles, solving_bytes, waiting_bytes
-from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
+from .texel_memory import least_bytes, pages_of, process_bytes, refuse_large_pages, room
 
 CHARTS = 6.0
 """Charts of an object whose faces look all ways; a heavy mesh has more: one for this many …"""
@@ -120,7 +120,7 @@ class Estimate:
     texels: Parallel to the objects: about how many each gets.
     densities: Parallel to the objects: about how many texels per meter.
     thinned: Parallel to the objects: below 1 for those that reach far beyond the others.
-    memory: What it takes in addition to what Blender already uses [bytes], …
+    memory: What this process takes at the peak, with what it takes now [bytes], …
     files: … and what does not fit into the memory limit: temporary files take it [bytes].
     seconds: None where it depends on the results: bakes to a target error, and methods for study.
     stages: How long each stage takes by the hierarchical method [s]; of another method, or to a target error,
@@ -143,13 +143,18 @@ class Estimate:
 
 
 def estimate_bake(
-    objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings, faces: int | None = None
+    objects: Sequence[LightmappedObject],
+    triangles: int,
+    settings: BakeSettings,
+    faces: int | None = None,
+    textures: float = 0.0,
 ) -> Estimate:
     """Reckon what a bake will be.
 
     objects: Those that get a lightmap.
     triangles: Of the whole scene, what only lights and blocks among them.
     faces: Their sides that take part in the light; None for both of each.
+    textures: What evaluating the materials will take [bytes]: 0 once that is done.
     """
     faces = 2 * triangles if faces is None else faces
     thinned = _thinned(objects, settings)
@@ -166,7 +171,7 @@ def estimate_bake(
     )
     # Only what belongs to texels can be in files.
     of_scene = waiting_bytes(triangles, faces)
-    most = max(room(settings) - of_scene, least_bytes(pages, settings))
+    most = max(room(settings) - textures - of_scene, least_bytes(pages, settings))
     kept = sum(item.triangles for item in objects if item.keeps_uvs)
     stages = _stages(triangles, kept, total, rays, settings)
     known = settings.method == "hierarchical" and settings.relative_error is None
@@ -178,7 +183,7 @@ def estimate_bake(
     return Estimate(
         tuple(pages),
         tuple(texels),
-        max(of_scene + in_memory, solving_bytes(triangles, faces, settings)),
+        process_bytes() + textures + max(of_scene + in_memory, solving_bytes(triangles, faces, settings)),
         of_texels - in_memory,
         sum(stages) if known else None,
         stages,
@@ -235,8 +240,9 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
 
     Raises UsageError: See `refuse_many_triangles` and `refuse_large_pages`.
     """
-    if settings.method == "hierarchical":
-        refuse_many_triangles(len(bake_scene.scene), lit_sides(bake_scene.scene), settings, exported=True)
+    faces = lit_sides(bake_scene.scene)
+    give_back()  # what the export freed, and finding closed solids
+    refuse_many_triangles(len(bake_scene.scene), faces, settings)
     sizes = pages_of(settings)
     if sizes is None:
         sizes = estimate_of(bake_scene, settings).pages

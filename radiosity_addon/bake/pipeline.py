@@ -6,13 +6,12 @@ Canceled or failed, nothing outside was touched.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..base import SILENT, BakeError, BakeWarning, Progress, SceneError, UsageError
+from ..base import SILENT, BakeError, Progress, SceneError, UsageError
 from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages
 from ..lightmap.lighting import (
     LightSoFar,
@@ -57,7 +56,7 @@ from .result import (
 )
 from .stages import StageTimes, timed
 from .texel_memory import refuse_large_pages, share_out_memory, texel_scratch
-from .turned_faces import BackProbe, front_irradiance, turned_away
+from .turned_faces import of_turned_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +120,6 @@ def _bake(
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
-    give_back()  # what the export freed
     refuse_before_unwrapping(bake_scene, settings)
     plan = estimate_of(bake_scene, settings)
     stages = plan.stages
@@ -157,7 +155,7 @@ def _bake(
     report |= {"glass": glass} if glass else {}
     warnings = (
         *atlas.warnings,
-        *_from_behind(bake_scene, baked, solution, geometry, lit),
+        *of_turned_faces(bake_scene, baked, solution, geometry, lit.light),
         *of_solution(solution, quality.solver),
     )
     solved = HierarchyReport(report, warnings)
@@ -336,22 +334,6 @@ def _texel_values(
     reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     values = held_values(light, reflectance, emission, settings, geometry.scratch)
     return TexelValues(values, local.caster, light, relightable, (reflectance, emission))
-
-
-def _from_behind(
-    bake_scene: BakeScene,
-    baked: list[BakeObject],
-    solution: Solution,
-    geometry: TexelGeometry,
-    lit: TexelValues,
-) -> Iterator[BakeWarning]:
-    """Warn of objects that are lit from behind only."""
-    front = solution.triangle_irradiance.max(axis=1)
-    if lit.light is not None:
-        front = front_irradiance(baked, geometry, lit.light, front)
-    probe = BackProbe(bake_scene.scene, solution.local_pass)
-    back = solution.back_irradiance.max(axis=1)
-    return turned_away(baked, bake_scene.scene.areas, front=front, back=back, probe=probe)
 
 
 def _seams(

@@ -66,6 +66,12 @@ class BakeDigests(NamedTuple):
         objects = {item.name: rounded_digest(bake_scene, item) for item in bake_scene.objects}
         return cls(light_digest(bake_scene, settings), objects)
 
+    def as_before(self, shown: ShownBake, names: Collection[str]) -> BakeDigests:
+        """Return them with those of some objects as in the last bake, which is not renewed for these."""
+        before = {name: digest for name, digest in shown.objects.items() if name in names}
+        others = {name: digest for name, digest in self.objects.items() if name not in names}
+        return BakeDigests(self.light, {**others, **before})
+
 
 @dataclass(frozen=True, eq=False)
 class BakePlan:
@@ -154,6 +160,7 @@ def plan_bake(
         density = float(np.median([lightmap.density for lightmap in same.values()]))
         settings = replace(settings, texel_density=density, pages=1)
     changed = replace(bake_scene, objects=objects)
+    digests = digests.as_before(shown, {*gone, *altered})
     return BakePlan("changed", changed, settings, digests, None, same.keys(), gone, altered)
 
 

@@ -1,7 +1,8 @@
-"""What the triangles of a scene take of the memory limit, counted before anything is made for them.
+"""What a scene that was read takes of the memory limit, counted before anything is made for it.
 
 The peak is in the solver, or while texels are lit: these take what is left, and files beyond it
-(`texel_memory.py`). What Blender takes with the open file is part of the limit.
+(`texel_memory.py`). What this process takes already, with the open file and the scene's arrays, is part of
+the limit and of every figure that is shown.
 """
 
 from __future__ import annotations
@@ -14,40 +15,35 @@ from ..solver.state import least_bytes as solver_bytes
 from .quality import quality_of
 from .texel_memory import memory_limit, process_bytes
 
-EXPORTED_BYTES = 330.0
-"""Of a triangle of the exported scene, …"""
-
 PREPARED_BYTES = 400.0
-"""… of its UVs and charts, and of the tree that rays are traced in …"""
+"""Of a triangle's UVs and charts, and of the tree that rays are traced in …"""
 
 LASTING_BYTES = 410.0
 """… and of a face once it is solved (docs/decisions/0052)."""
 
 
 def solving_bytes(triangles: int, faces: int, settings: BakeSettings) -> float:
-    """Return what a scene takes at the peak of the solver, beside what Blender takes [bytes]."""
-    solver = solver_bytes(faces, quality_of(settings).solver)
-    return triangles * (EXPORTED_BYTES + PREPARED_BYTES) + solver
+    """Return what a scene takes at the peak of the solver, in addition to what this process takes [bytes]."""
+    return triangles * PREPARED_BYTES + solver_bytes(faces, quality_of(settings).solver)
 
 
 def waiting_bytes(triangles: int, faces: int) -> float:
-    """Return what a solved scene takes while its texels are lit, beside what they take [bytes]."""
-    return triangles * (EXPORTED_BYTES + PREPARED_BYTES) + faces * LASTING_BYTES
+    """Return what a solved scene takes while its texels are lit, in addition to that and to them [bytes]."""
+    return triangles * PREPARED_BYTES + faces * LASTING_BYTES
 
 
-def refuse_many_triangles(triangles: int, faces: int, settings: BakeSettings, exported: bool = False) -> None:
+def refuse_many_triangles(triangles: int, faces: int, settings: BakeSettings, textures: float = 0.0) -> None:
     """Refuse a scene whose bake will not fit into the memory limit, whatever its pages are.
 
     triangles: Of the whole scene.
     faces: Their sides that take part in the light.
-    exported: Whether the scene's arrays are part of what this process takes now.
+    textures: What evaluating its materials will take [bytes].
     Raises UsageError: Names the number of triangles, what they need, and what helps.
     """
     if settings.method != "hierarchical":
         return
     limit = memory_limit(settings)
-    needed, taken = solving_bytes(triangles, faces, settings), process_bytes()
-    needed -= EXPORTED_BYTES * triangles if exported else 0.0
+    needed, taken = textures + solving_bytes(triangles, faces, settings), process_bytes()
     # Small scenes fit next to whatever Blender has open, as ever.
     if needed <= max(limit - taken, 0.5 * limit):
         return

@@ -4,8 +4,9 @@ A wall whose normals point out of its room, or a bathtub whose normals point inw
 render, as both sides of a surface show, and black once it is baked. Somebody who does not know that will look
 for a leak.
 
-The solver's elements are too coarse for this: inside a thin shell they get a tenth of the light around it. So
-fronts are judged by their texels, and backs by rays.
+Closed objects that are inside out are found by their shape alone, also before a bake. For all others it takes
+light. The solver's elements are too coarse for this: inside a thin shell they get a tenth of the light around
+it. So fronts are judged by their texels, and backs by rays.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from ..lightmap.texels import TexelGeometry
 from ..lightmap.transport import TexelLight
 from ..numerics import Array, Stream, cosine_hemisphere, stratified_square, tiles, to_world
 from ..rays import NO_HIT
-from ..scene import BakeObject, Scene
+from ..scene import BakeObject, BakeScene, Scene, inside_out
+from ..solver import Solution
 from ..solver.gather import Footprints, LocalPass
 
 DARK = 0.02
@@ -37,6 +39,42 @@ PROBED, PROBES = 64, 16
 
 OPEN = 0.5
 """A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
+
+
+def of_turned_faces(
+    bake_scene: BakeScene,
+    baked: list[BakeObject],
+    solution: Solution,
+    geometry: TexelGeometry,
+    light: TexelLight | None,
+) -> Iterator[BakeWarning]:
+    """Warn of objects that are inside out, and of others that are lit from behind only."""
+    turned = of_inside_out(bake_scene)
+    yield from turned
+    front = solution.triangle_irradiance.max(axis=1)
+    if light is not None:
+        front = front_irradiance(baked, geometry, light, front)
+    probe = BackProbe(bake_scene.scene, solution.local_pass)
+    back = solution.back_irradiance.max(axis=1)
+    named = {warning.name for warning in turned}
+    for warning in turned_away(baked, bake_scene.scene.areas, front, back, probe):
+        if warning.name not in named:
+            yield warning
+
+
+def of_inside_out(bake_scene: BakeScene) -> list[BakeWarning]:
+    """Return a warning for each object that gets a lightmap and is inside out on a large area."""
+    turned, areas = inside_out(bake_scene), bake_scene.scene.areas
+    warnings = []
+    for item in bake_scene.objects:
+        inward, whole = float(areas[item.rows] @ turned[item.rows]), float(areas[item.rows].sum())
+        if item.bake and inward > MAX_TURNED_SHARE * whole:
+            message = (
+                f"object '{item.name}' is inside out on {inward / whole:.0%} of its surface: normals point "
+                "inward, so its lightmap is black there; use Mesh → Normals → Recalculate Outside"
+            )
+            warnings.append(BakeWarning(item.name, message))
+    return warnings
 
 
 class BackProbe:

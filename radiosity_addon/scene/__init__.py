@@ -9,6 +9,7 @@ from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene
 from .closed_solids import sealed_backs
 from .coincident_faces import coincident_triangles
 from .faces import Faces
+from .inside_out_parts import inside_out
 from .opacity import ray_caster
 from .overlaps import OVERLAP, arriving, shares
 from .scene import Scene
@@ -28,6 +29,7 @@ __all__ = [
     "arriving",
     "coincident_triangles",
     "glow_pattern",
+    "inside_out",
     "ray_caster",
     "same_glow",
     "sealed_backs",

@@ -65,6 +65,7 @@ class BakeScene:
     emitter_names: The names of those materials; one in several light groups occurs once for each.
     light_groups, emitter_groups: The scene's light groups of its lights and of those materials, "" for none;
         empty if the scene has no groups.
+    cameras (n, 3): Where the scene's cameras are: a room has one in it.
     """
 
     scene: Scene
@@ -74,3 +75,4 @@ class BakeScene:
     emitter_names: tuple[str, ...] = ()
     light_groups: tuple[str, ...] = ()
     emitter_groups: tuple[str, ...] = ()
+    cameras: tuple[tuple[float, float, float], ...] = ()

@@ -35,7 +35,7 @@ def sealed_backs(triangles: Array, solid: Array, emits: Array, lights: Sequence[
     if len(rows) == 0 or shadowless:
         return sealed
     corners = triangles[rows]
-    part, is_closed = _closed_parts(_places(corners))
+    part, is_closed = closed_parts(places(corners))
     count = len(is_closed)
     local = corners - corners.reshape(-1, 3).mean(axis=0)
     vectors = double_area_vectors(local)
@@ -45,17 +45,22 @@ def sealed_backs(triangles: Array, solid: Array, emits: Array, lights: Sequence[
     kept = np.flatnonzero(is_closed[part])
     if len(kept) == 0:
         return sealed
-    boxes = _boxes(corners[kept], part[kept], count)
+    boxes = boxes_of(corners[kept], part[kept], count)
     shining = np.concatenate([_boxes_of_emitters(triangles[emits]), _boxes_of_lamps(lights)])
     is_closed &= ~_touched(boxes, shining)
     sealed[rows] = is_closed[part]
     return sealed
 
 
-def _places(corners: Array) -> Array:
-    """Number the places of (t, 3, 3) corners exactly: (t, 3) int64."""
+def places(corners: Array, apart: Array | None = None) -> Array:
+    """Number the places of (t, 3, 3) corners exactly: (t, 3) int64.
+
+    apart (t,) int: Corners of triangles with different numbers are in different places.
+    """
     bits = (corners.reshape(-1, 3) + 0.0).view(np.uint64)  # 0 and −0 are one place
     key: Array = np.zeros(len(bits), dtype=np.uint64)
+    if apart is not None:
+        key += np.repeat(apart, 3).astype(np.uint64)
     for column in bits.T:
         # One number for three is several times as fast to sort; that two places share one is unlikely.
         key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
@@ -63,7 +68,7 @@ def _places(corners: Array) -> Array:
     return np.unique(key, return_inverse=True)[1].reshape(-1, 3)
 
 
-def _closed_parts(places: Array) -> tuple[Array, Array]:
+def closed_parts(places: Array) -> tuple[Array, Array]:
     """Return (t,) the part of the surface that each triangle is in, and (parts,) whether it is closed.
 
     places (t, 3) int: Of the corners. Parts go on where two triangles meet at an edge, not where more do:
@@ -98,7 +103,7 @@ def _closed_parts(places: Array) -> tuple[Array, Array]:
     return label, is_closed
 
 
-def _boxes(corners: Array, group: Array, count: int) -> Array:
+def boxes_of(corners: Array, group: Array, count: int) -> Array:
     """Return (count, 2, 3) boxes around groups of triangles; empty ones are inside out."""
     order = np.argsort(group, kind="stable")
     ordered = group[order]
@@ -114,8 +119,8 @@ def _boxes_of_emitters(triangles: Array) -> Array:
     """Return (n, 2, 3) boxes around the connected parts of what shines."""
     if len(triangles) == 0:
         return np.zeros((0, 2, 3))
-    part, is_closed = _closed_parts(_places(triangles))
-    return _boxes(triangles, part, len(is_closed))
+    part, is_closed = closed_parts(places(triangles))
+    return boxes_of(triangles, part, len(is_closed))
 
 
 def _boxes_of_lamps(lights: Sequence[Light]) -> Array:

@@ -83,13 +83,17 @@ class Scene:
         """The sides that coincident sides cover."""
         return Layers(self)
 
+    @property
+    def solid(self) -> Array:
+        """(t,) bool: what stops all light."""
+        solid = self.in_bounces & self.in_shadows
+        return solid if self.images is None else solid & ~self.images.cut_out
+
     @cached_property
     def sealed(self) -> Array:
         """(t,) bool: backs inside closed, opaque solids: no light reaches them, and nobody sees them."""
-        solid = self.in_bounces & self.in_shadows
-        if self.images is not None:
-            solid &= ~self.images.cut_out
-        return sealed_backs(self.triangles, solid, self.emission.any(axis=1), self.lights) & self.two_sided
+        emits = self.emission.any(axis=1)
+        return sealed_backs(self.triangles, self.solid, emits, self.lights) & self.two_sided
 
     def _average(self, images: SurfaceImages) -> None:
         """Use the images' area means as constants of the textured triangles."""

@@ -61,6 +61,11 @@ def test_without_a_preview(run: Run, room: Path, tmp_path: Path) -> None:
     done = run("bake", room, "--output", tmp_path / "out", "--relight", "--no-preview")
     assert (done.code, done.err) == (0, "")
     assert set(digest(tmp_path / "out")) == files
+    before = digest(tmp_path / "out")
+    done = run("bake", room, "--output", tmp_path / "out", "--relight", *QUICK, "--opaque-glass")
+    assert done.code == 2
+    assert "which differ in --opaque-glass: leave these out, or bake again" in done.err
+    assert digest(tmp_path / "out") == before
 
 
 def test_the_report_keeps_its_contract(baked: Baked) -> None:

@@ -173,7 +173,22 @@ def test_what_is_inside_out_is_reported_unless_it_is_a_room(tmp_path: Path) -> N
     add_mesh("Turned", CUBE, inwards, location=(10, 0, 1))
     add_mesh("Mirrored", CUBE, CUBE_FACES, location=(15, 0, 1), scale=(-1, 1, 1))
     add_mesh("Hall", [(20 * x, 20 * y, 20 * z) for x, y, z in CUBE], inwards)
-    assert [name for name, text in odd(look(tmp_path)).items() if "inside out" in text] == ["Turned"]
+    # Its center is in the box around the turned cube, and most of it outside.
+    add_mesh("Rod", [(0.1 * x, 0.1 * y, 3 * z) for x, y, z in CUBE], CUBE_FACES, location=(10, 0, 1))
+    told = {name: text for name, text in odd(look(tmp_path)).items() if "inside out" in text}
+    assert list(told) == ["Turned"]
+    result = drain(run_bake(bpy.context, BakeSettings(resolution=64, quality="draft"), None))
+    warnings = [w for w in result.as_dict()["warnings"] if "inside out" in str(w)]
+    assert [told["Turned"] in str(warning) for warning in warnings] == [True]
+
+
+def test_an_empty_room_with_a_camera_in_it_is_not_inside_out(tmp_path: Path) -> None:
+    hall = add_mesh("Hall", CUBE, [face[::-1] for face in CUBE_FACES])
+    assert "inside out" in odd(look(tmp_path))["Hall"]
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    bpy.context.scene.collection.objects.link(camera)
+    camera.location = hall.location
+    assert "Hall" not in odd(look(tmp_path))
 
 
 def test_faces_in_one_place_are_named_with_their_number(tmp_path: Path) -> None:
@@ -208,6 +223,15 @@ def test_a_black_material_is_worth_knowing(tmp_path: Path) -> None:
     bpy.data.objects["Floor"].data.materials.append(material)
     found = [finding for finding in look(tmp_path).findings if finding.name == "Tar"]
     assert [(finding.level, "black" in finding.message) for finding in found] == [(INFO, True)]
+
+
+def test_a_refusal_names_the_memory_that_is_shown(tmp_path: Path) -> None:
+    build_cornell_box()
+    found = look(tmp_path, replace(SETTINGS, memory_limit=0.001, resolution=16))
+    (message,) = (finding.message for finding in found.findings if finding.name == "memory")
+    shown = dict(checks.figures(found))["Memory"]
+    assert shown == f"about {found.estimate.memory / 2**30:.1f} GiB with Blender"
+    assert f"need about {found.estimate.memory / 2**30:.1f} GiB, " in message
 
 
 def test_nothing_to_bake_is_an_error_not_an_exception(tmp_path: Path) -> None:

@@ -227,6 +227,33 @@ def test_an_object_that_is_gone_is_named(room: Path, capfd: pytest.CaptureFixtur
     assert one_says((message for _, message in last.warnings), "removed", "Shelf")
 
 
+def test_what_has_no_lightmap_is_named_until_all_is_baked(
+    room: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """An object that is light only, and one that is gone, after a bake of another that changed."""
+    add_mesh("Blind", location=(0, 0, 1.5), scale=(0.3, 0.3, 1)).radiosity_mode = "LIGHT_ONLY"
+    bpy.context.scene.radiosity.scope = "all"
+    assert bake() == {"FINISHED"}
+    bpy.context.scene.radiosity.scope = "changed"
+    assert bake() == {"CANCELLED"}
+    bpy.data.objects["Blind"].location.x += 0.3
+    bpy.data.objects.remove(bpy.data.objects["Shelf"])
+    bpy.data.objects["Box"].location.x -= 0.5
+    assert bake() == {"FINISHED"}
+    capfd.readouterr()
+    for _ in range(2):
+        assert bake() == {"CANCELLED"}
+        printed = capfd.readouterr().out
+        assert says(printed, "removed", "'Shelf'")
+        assert says(printed, "changed", "'Blind'")
+    bpy.context.scene.radiosity.scope = "all"
+    assert bake() == {"FINISHED"}
+    bpy.context.scene.radiosity.scope = "changed"
+    capfd.readouterr()
+    assert bake() == {"CANCELLED"}
+    assert "nothing has changed since the last bake" in capfd.readouterr().out
+
+
 def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
     from radiosity_addon.blender.files.output import OutputFolder
     from radiosity_addon.blender.files.ownership import panel_names

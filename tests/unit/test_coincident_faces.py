@@ -109,3 +109,25 @@ def test_of_faces_one_closely_above_the_other_the_lower_one_is_reported() -> Non
     below = rectangle((0, 0, 1.0), (1, 0, 0), (0, 1, 0))
     scene = gray_scene(np.concatenate([above, below]), two_sided=True)
     assert coincident_triangles(scene).tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("height", "turned", "found"),
+    [
+        (0.0, False, [True, True]),
+        (0.6e-6, False, [True, True]),
+        (0.7e-6, False, [True, False]),
+        (-0.7e-6, False, [False, True]),
+        (1.2e-6, False, [True, False]),
+        (1.3e-6, False, [False, False]),
+        (0.0, True, [True, True]),
+        (0.6e-6, True, [False, False]),
+        (1.2e-6, True, [False, False]),
+    ],
+)
+def test_which_faces_coincide_as_the_guide_says(height: float, turned: bool, found: list[bool]) -> None:
+    """Below 1.25 µm the one behind, below half of it both, and in one place those that face opposite ways."""
+    lower, upper = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, height), (1, 0, 0), (0, 1, 0))
+    triangles = np.concatenate([lower, upper[:, ::-1] if turned else upper])
+    expected = np.repeat(found, 2)
+    np.testing.assert_array_equal(coincident_triangles(gray_scene(triangles, two_sided=True)), expected)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -308,7 +309,8 @@ def test_canceled_it_leaves_nothing_running(steps: int) -> None:
 
 
 def test_without_light_it_is_black_and_says_so() -> None:
-    result = run(lit_room())
+    seen_from_within = replace(lit_room(), cameras=((0.5, 0.5, 0.5),))
+    result = run(seen_from_within)
     assert not result.pages[0].pixels.any()
     assert [warning.name for warning in result.warnings] == ["scene"]
     assert "black" in result.warnings[0].message

@@ -120,6 +120,27 @@ def test_changes_of_what_has_no_lightmap_are_named() -> None:
         assert ("'Box'" in plan.reason) == bool(altered)
 
 
+@pytest.mark.parametrize("is_new", [False, True])
+def test_what_a_bake_leaves_out_is_named_again_until_all_is_baked(is_new: bool) -> None:
+    """An object that was removed, and one without a lightmap that was painted, or is new."""
+    first = shown()
+    objects = {name: digest for name, digest in first.objects.items() if not is_new or name != "Box"}
+    lightmaps = {name: old for name, old in first.lightmaps.items() if name != "Box"}
+    lightmaps["Room"] = lightmaps["Room"]._replace(digest="another")
+    first = ShownBake(lightmaps, {**objects, "Shelf": "gone"})
+    painted = with_arrays(reflectance=lambda old: 0.5 * old)
+    scene = replace(painted, objects=tuple(replace(o, bake=o.name != "Box") for o in painted.objects))
+    plan = plan_bake(scene, SETTINGS, first, None)
+    assert (plan.kind, plan.gone, plan.altered) == ("changed", ["Shelf"], ["Box"])
+
+    for name in lightmaps:
+        lightmaps[name] = lightmaps[name]._replace(digest=plan.digests.objects[name])
+    second = ShownBake(lightmaps, {name: digest[:SHORT] for name, digest in plan.digests.objects.items()})
+    plan = plan_bake(scene, SETTINGS, second, None)
+    assert (plan.kind, plan.gone, plan.altered) == ("nothing", ["Shelf"], ["Box"])
+    assert plan_bake(scene, SETTINGS, None, None).digests == BakeDigests.of(scene, SETTINGS)
+
+
 @pytest.mark.parametrize(
     ("scene", "settings", "remembered"),
     [

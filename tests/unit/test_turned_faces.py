@@ -28,7 +28,8 @@ class AlwaysLit(BackProbe):
 
 def told(scene: BakeScene, **settings: int) -> list[str]:
     result = run(scene, **settings)
-    return sorted(warning.name for warning in result.warnings if "from behind only" in warning.message)
+    said = ("is lit from behind only", "is inside out on 100% of its surface")
+    return sorted(w.name for w in result.warnings if any(text in w.message for text in said))
 
 
 def turned(triangles: np.ndarray) -> np.ndarray:

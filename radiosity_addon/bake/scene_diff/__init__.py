@@ -7,9 +7,17 @@ from __future__ import annotations
 
 from .diff import RELIGHTABLE, Part, SceneDiff, compare
 from .lights import aligned, dark, differs_in_strength_alone
-from .record import SceneRecord, as_object_records, light_digest, rounded_digest, scene_record
+from .record import (
+    OF_NO_CONSEQUENCE,
+    SceneRecord,
+    as_object_records,
+    light_digest,
+    rounded_digest,
+    scene_record,
+)
 
 __all__ = [
+    "OF_NO_CONSEQUENCE",
     "RELIGHTABLE",
     "Part",
     "SceneDiff",

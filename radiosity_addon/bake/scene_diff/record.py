@@ -24,7 +24,7 @@ DIGEST_STEP = 1.0 / 256.0
 _POINTS = np.array([[1, 1], [4, 1], [1, 4], [2, 2]]) / 6.0
 """Where a rounded digest samples a textured triangle: weights of its second and third corner."""
 
-_OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_seconds"})
+OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_seconds"})
 """Settings that change no texel of a lightmap that is kept."""
 
 
@@ -126,7 +126,7 @@ def light_digest(bake_scene: BakeScene, settings: BakeSettings) -> str:
     digest.update(_rounded(bake_scene.scene.triangles[emits]))
     digest.update(_rounded(bake_scene.scene.emission[emits]))
     for option in fields(settings):
-        if option.name not in _OF_NO_CONSEQUENCE:
+        if option.name not in OF_NO_CONSEQUENCE:
             digest.update(f"{option.name}={getattr(settings, option.name)!r};".encode())
     return digest.hexdigest()
 

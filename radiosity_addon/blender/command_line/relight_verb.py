@@ -15,7 +15,7 @@ from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
-from ...options import BakeSettings
+from ...options import OPTIONS, BakeSettings
 from ..apply.rebake import Originals
 from ..files.output import OutputFolder
 from ..files.single_files import check_places
@@ -68,9 +68,12 @@ def relight(
         console.progress("read", 0.0)
         stored = read_sidecar(output / SIDECAR_NAME, settings.memory_limit)
         check_belongs(stored, output / REPORT_NAME)
-        given = replace(settings, memory_limit=None)
-        if given not in (BakeSettings(), replace(stored.settings, memory_limit=None)):
-            raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
+        other = _other_flags(settings, stored.settings)
+        if other:
+            raise UsageError(
+                f"--relight uses the settings of the bake in {output}, which differ in {', '.join(other)}: "
+                "leave these out, or bake again"
+            )
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
         job = relight_into(bpy.context, stored, folder, notes, preview)
@@ -79,6 +82,15 @@ def relight(
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)
         console.lines(summary(str(output), files, report.as_dict()))
+
+
+def _other_flags(given: BakeSettings, of_bake: BakeSettings) -> list[str]:
+    """Return the flags that were given with other values than those of a bake; memory is this run's own."""
+    return [
+        option.flag
+        for name, option in OPTIONS.items()
+        if name != "memory_limit" and getattr(given, name) not in (option.default, getattr(of_bake, name))
+    ]
 
 
 def relight_into(

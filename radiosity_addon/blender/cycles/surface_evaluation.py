@@ -30,6 +30,10 @@ from .surface_rewiring import EXPRESSIONS
 MIN_SIDE, MIN_CUT_OUT_SIDE, MAX_SIDE = 256, 1024, 2048
 """Texels along the image's side."""
 
+TEXEL_BYTES, CUT_OUT_BYTES = 28.0, 72.0
+"""What is kept of each: reflectance, emission and opacity; where some are cut out, also these multiplied by
+opacity, and the colors that pass."""
+
 
 def evaluate_surfaces(
     context: bpy.types.Context,
@@ -87,6 +91,14 @@ def evaluate_surfaces(
             yield from elsewhere(partial(batch.put, seen, terms[channel]), in_background)
     glass = np.array([one.glass for one in surfaces])[own]
     return (yield from elsewhere(lambda: _images(tiles, terms, rows, glass, len(surface)), in_background))
+
+
+def foreseen_bytes(surfaces: Sequence[Surface], settings: BakeSettings) -> float:
+    """Return about what the image of the materials that vary will take [bytes]."""
+    if not any(one.varies for one in surfaces):
+        return 0.0
+    cut_out = any(one.opacity < 1.0 for one in surfaces)
+    return (CUT_OUT_BYTES if cut_out else TEXEL_BYTES) * _side(settings, cut_out) ** 2
 
 
 def _side(settings: BakeSettings, cut_out: bool) -> int:

@@ -20,16 +20,19 @@ from ...bake import (
     Estimate,
     LightmappedObject,
     estimate_bake,
+    process_bytes,
     refuse_large_pages,
     refuse_many_triangles,
     thinned_out,
 )
-from ...base import BakeWarning, RadiosityError
+from ...base import RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import folder as scratch_folder
+from ...numerics import give_back
 from ...options import BakeSettings
 from ...scene import LIGHTMAP_UV_LAYER
 from ..apply.rebake import originals_shown
+from ..cycles.surface_evaluation import foreseen_bytes
 from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
@@ -37,8 +40,8 @@ from ..scene_export.export import all_glass, check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
-from .coincident_check import coincident_warnings
 from .lit_objects import PieceShape, glass_materials, lit_objects, lit_sides, piece_shape
+from .shape_checks import coincident_warnings, inside_out_warnings, unlit_scene
 
 if TYPE_CHECKING:
     from ..cycles.lamps import LampFactors
@@ -149,10 +152,14 @@ def inspect(
         findings.append(Finding(ERROR, chosen[0].source.name, all_glass(chosen[0].source.name)))
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     faces = lit_sides(collected.pieces, collected)
-    plan = estimate_bake(lit, triangles, settings, faces)
+    give_back()
+    textures = foreseen_bytes(collected.surfaces, settings)
+    plan = estimate_bake(lit, triangles, settings, faces, textures)
+    findings += _of_memory(plan, triangles, faces, textures, settings)
     refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
     if refused is not None:
         findings.append(Finding(ERROR, "file", refused))
+    shown = unlit_scene(collected, chosen)
     findings += [
         *_of_the_file(folder),
         *_of_light(context, collected, settings),
@@ -160,10 +167,11 @@ def inspect(
         *_of_visibility(context),
         *_of_layers(chosen, settings),
         *_of_texels(lit, plan),
-        *_of_shapes(context, collected, shapes),
+        *_of_scales(collected),
         *_of_size(shapes),
-        *_of_memory(plan, triangles, faces, settings),
-        *(Finding(INFO, warning.name, warning.message) for warning in _more_warnings(collected, chosen)),
+        *(Finding(WARNING, warning.name, warning.message) for warning in inside_out_warnings(shown)),
+        *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
+        *(Finding(INFO, warning.name, warning.message) for warning in coincident_warnings(shown)),
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
     return Inspection(
@@ -182,10 +190,6 @@ def _of_glass(collected: SceneContents) -> Iterator[Finding]:
         listed = ", ".join(f"'{name}'" for name in names)
         message = f"light goes straight through glass, which gets no lightmap: {listed}"
         yield Finding(INFO, names[0], message)
-
-
-def _more_warnings(collected: SceneContents, chosen: Sequence[Piece]) -> list[BakeWarning]:
-    return [*collected.warnings, *coincident_warnings(collected.pieces, chosen)]
 
 
 def _of_the_file(folder: Path | None) -> Iterator[Finding]:
@@ -301,32 +305,12 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
         yield Finding(WARNING, greedy, message)
 
 
-def _of_shapes(
-    context: bpy.types.Context, collected: SceneContents, shapes: dict[int, PieceShape]
-) -> Iterator[Finding]:
-    """Name objects that are inside out, and scales that look forgotten."""
-    pieces = [piece for piece in collected.pieces if id(piece) in shapes]
-    centers = np.array([shapes[id(piece)].box.mean(axis=0) for piece in pieces]).reshape(-1, 3)
-    others = [
-        obj.matrix_world.translation for obj in context.scene.objects if obj.type in {"LIGHT", "CAMERA"}
-    ]
-    centers = np.concatenate([centers, np.array(others, dtype=np.float64).reshape(-1, 3)])
-    inverted = []
-    for number, piece in enumerate(pieces):
-        shape = shapes[id(piece)]
-        if shape.volume is None or shape.volume >= -1e-6 * shape.area**1.5:
-            continue
-        inside = ((centers > shape.box[0]) & (centers < shape.box[1])).all(axis=1)
-        inside[number] = False
-        # A room is inside out, and right so: it is seen from within.
-        if not inside.any():
-            inverted.append(piece.source.name)
-    if inverted:
-        message = f"{_names(inverted)} probably inside out: normals point inward, so lightmaps would be black"
-        yield Finding(WARNING, inverted[0], message)
-    for piece in pieces:
+def _of_scales(collected: SceneContents) -> Iterator[Finding]:
+    """Name scales that look forgotten."""
+    for piece in collected.pieces:
         scale = np.linalg.norm(piece.matrix[:3, :3], axis=0)
-        if not piece.source.is_instance and (scale.max() > ODD_SCALE or scale.min() < 1.0 / ODD_SCALE):
+        odd = scale.max() > ODD_SCALE or scale.min() < 1.0 / ODD_SCALE
+        if odd and len(piece.mesh) and not piece.source.is_instance:
             factors = " × ".join(f"{value:g}" for value in scale)
             message = f"object '{piece.source.name}' has a scale of {factors}: apply it if that is a mistake"
             yield Finding(WARNING, piece.source.name, message)
@@ -347,10 +331,12 @@ def _of_size(shapes: dict[int, PieceShape]) -> Iterator[Finding]:
         )
 
 
-def _of_memory(plan: Estimate, triangles: int, faces: int, settings: BakeSettings) -> Iterator[Finding]:
+def _of_memory(
+    plan: Estimate, triangles: int, faces: int, textures: float, settings: BakeSettings
+) -> Iterator[Finding]:
     """Say whether triangles or pages exceed the memory limit, and whether memory or disk may not do."""
     try:
-        refuse_many_triangles(triangles, faces, settings)
+        refuse_many_triangles(triangles, faces, settings, textures)
         refuse_large_pages(plan.pages, settings)
     except RadiosityError as error:
         yield Finding(ERROR, "memory", str(error))
@@ -363,10 +349,10 @@ def _of_memory(plan: Estimate, triangles: int, faces: int, settings: BakeSetting
         if plan.files > disk:
             message += f", where {disk / 1e9:.1f} GB are free: free some, or raise the memory limit"
         yield Finding(WARNING if plan.files > disk else INFO, "memory", message)
-    free = free_memory()
-    if free is not None and plan.memory > free:
+    free, more = free_memory(), plan.memory - process_bytes()
+    if free is not None and more > free:
         message = (
-            f"about {plan.memory / 1e9:.1f} GB will be needed and {free / 1e9:.1f} GB are free: "
+            f"about {more / 2**30:.1f} GiB more will be needed and {free / 2**30:.1f} GiB are free: "
             "lower the resolution or the quality"
         )
         yield Finding(WARNING, "memory", message)

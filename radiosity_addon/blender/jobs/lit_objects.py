@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...bake import LightmappedObject
-from ...numerics import double_area_vectors, triangle_areas
+from ...numerics import triangle_areas
 from ...scene import sealed_backs
 from ..datablocks.mesh_arrays import world_from_object
 from ..scene_records.pieces import Piece, SceneContents
@@ -16,30 +16,20 @@ from ..scene_records.pieces import Piece, SceneContents
 MANY_SIDES = 200_000
 """Of fewer sides all are counted: they need little."""
 
-CLOSED = 1e-4
-"""A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
-
 
 @dataclass(frozen=True)
 class PieceShape:
-    """A piece in the world: its area [m²], the box around it (2, 3) and, if it is closed, its volume [m³]."""
+    """A piece in the world: its area [m²] and the box around it (2, 3)."""
 
     area: float
     box: np.ndarray
-    volume: float | None
 
 
 def piece_shape(piece: Piece) -> PieceShape:
     """Return the shape of a piece with faces."""
     corners, _, _ = world_from_object(piece.mesh, piece.matrix)
     flat = corners.reshape(-1, 3)
-    box = np.stack([flat.min(axis=0), flat.max(axis=0)])
-    local = corners - box.mean(axis=0)
-    vectors = 0.5 * double_area_vectors(local)
-    area = float(np.linalg.norm(vectors, axis=1).sum())
-    closed = area > 0 and np.linalg.norm(vectors.sum(axis=0)) < CLOSED * area
-    volume = float(np.einsum("tk,tk->t", local[:, 0], vectors).sum() / 3.0) if closed else None
-    return PieceShape(area, box, volume)
+    return PieceShape(float(triangle_areas(corners).sum()), np.stack([flat.min(axis=0), flat.max(axis=0)]))
 
 
 def lit_objects(

@@ -61,7 +61,7 @@ def figures(found: Any) -> list[tuple[str, str]]:
         ("Images", pages or "0"),
         ("Texels", f"about {_rounded(found.texels):,}, {plan.utilization:.0%} of the images"),
         ("Density", _densities(plan.densities)),
-        ("Memory", f"about {_bytes(plan.memory)}"),
+        ("Memory", f"about {plan.memory / 2**30:.1f} GiB with Blender"),
         (
             "Time",
             "until the error is reached" if plan.seconds is None else f"roughly {duration(plan.seconds)}",
@@ -81,7 +81,3 @@ def _densities(densities: Sequence[float]) -> str:
 def _rounded(count: int) -> int:
     """Round to two digits: it is not known any better."""
     return int(float(f"{count:.2g}"))
-
-
-def _bytes(count: float) -> str:
-    return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{round(count / 1e6, -1):.0f} MB"

@@ -27,7 +27,12 @@ class RADIOSITY_OT_relight(Conditional, WindowJob, bpy.types.Operator):
         return run_relight(context, in_background=in_window)
 
     def _succeeded(self, _context: bpy.types.Context, _in_window: bool) -> None:
-        self.report({"INFO"}, f"Relit in {self._report.seconds:.2f} s")
+        relit = f"Relit in {self._report.seconds:.2f} s"
+        if not self._report.needs_bake:
+            self.report({"INFO"}, relit)
+            return
+        named = ", ".join(f"'{label}'" for label in self._report.needs_bake)
+        self.report({"WARNING"}, f"{relit} with the settings of the bake; {named} changed since: bake again")
 
 
 CLASSES = (RADIOSITY_OT_relight,)

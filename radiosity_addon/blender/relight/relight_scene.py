@@ -12,6 +12,7 @@ import numpy as np
 
 from ...bake.relight import KeptBake, are_wanted, group_pages, relight_pages, strengths_in
 from ...bake.result import LightGroup
+from ...bake.scene_diff import OF_NO_CONSEQUENCE
 from ...bake.sidecar import StoredBake, read_sidecar
 from ...base import SILENT, BakeError, Progress, Status, drain, staged
 from ...lightmap.images import LightmapPage
@@ -19,6 +20,7 @@ from ...numerics import Array
 from ..apply.rebake import Originals
 from ..scene_export.export import export_steps
 from ..session.background import in_thread
+from ..settings.option_properties import changed_labels
 from . import kept_bakes, lightmap_versions
 from .kept_bakes import InMemory
 from .kept_sidecars import NO_BAKE, NO_DATA, sidecar_of
@@ -34,10 +36,14 @@ Relit = tuple[tuple[LightmapPage, ...], tuple[LightGroup, ...]]
 
 @dataclass(frozen=True)
 class RelightReport:
-    """What was done: the seconds it took, and whether anything had changed."""
+    """What was done: the seconds it took, and whether anything had changed.
+
+    needs_bake: Labels of the options that the panel now has other values of than the bake, which count there.
+    """
 
     seconds: float
     changed: bool
+    needs_bake: tuple[str, ...] = ()
 
 
 def run_relight(
@@ -63,7 +69,8 @@ def run_relight(
     taken = time.perf_counter() - started
     rewrite(mark, pages, groups, taken)
     note_shown(context.scene, held, strengths)
-    return RelightReport(time.perf_counter() - started, not same)
+    needs_bake = changed_labels(context.scene.radiosity, held.bake.settings, OF_NO_CONSEQUENCE)
+    return RelightReport(time.perf_counter() - started, not same, needs_bake)
 
 
 def read_strengths(context: bpy.types.Context) -> tuple[InMemory, Array]:

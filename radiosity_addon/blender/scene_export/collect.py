@@ -151,7 +151,7 @@ class _Collector:
 
     def sorted_out(self) -> SceneContents:
         """Return what was found and is still there, in the scene's order; needs no Blender."""
-        collected = SceneContents([], [], [], [], [], [])
+        collected = SceneContents([], [], [], [], [], [], self._cameras)
         rows: dict[int, int] = {}
         read: dict[int, MeshArrays | None] = {}
         for key in self._order:
@@ -185,6 +185,8 @@ class _Collector:
         self._membership = Membership(depsgraph.scene.original)
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[tuple[int, frozenset[str]], tuple[RawMesh, MeshValues]] = {}
+        everything = depsgraph.scene_eval.objects
+        self._cameras = [tuple(obj.matrix_world.translation) for obj in everything if obj.type == "CAMERA"]
         layer = depsgraph.view_layer
         self._held_out = {obj.name_full for obj in layer.objects if obj.holdout_get(view_layer=layer)}
         own = {obj.name_full for obj in layer.objects}

@@ -234,6 +234,7 @@ def _export(
             emitting,
             of_lights,
             emitter_groups,
+            tuple(collected.cameras),
         ),
         tuple(sources),
     )

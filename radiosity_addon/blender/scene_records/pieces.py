@@ -103,7 +103,8 @@ class Found:
 class SceneContents:
     """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`.
 
-    `groups` are the lights' light groups, parallel to them, "" for those in none.
+    `groups` are the lights' light groups, parallel to them, "" for those in none; `cameras` are the places of
+    cameras.
     """
 
     pieces: list[Piece]
@@ -112,6 +113,7 @@ class SceneContents:
     lights: list[Light]
     warnings: list[BakeWarning]
     groups: list[str]
+    cameras: list[tuple[float, float, float]]
 
 
 def piece_of(

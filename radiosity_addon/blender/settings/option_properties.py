@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import bpy
 
-from ...options import OPTIONS, PANEL_OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Choice, Option
+from ...options import OPTIONS, PANEL_OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, BakeSettings, Choice, Option
 
 PREFERRED = ("output_folder", "memory_limit", "threads")
 """Options that the preferences have too, for scenes that do not set them."""
@@ -102,6 +102,18 @@ def chosen_options(group: Any) -> dict[str, Any]:
         if is_shown(option, group)
     }
     return {name: value for name, value in values.items() if _chosen(OPTIONS[name], value)}
+
+
+def changed_labels(group: Any, settings: BakeSettings, ignored: Collection[str]) -> tuple[str, ...]:
+    """Return the labels of the options that the panel now has other values of than a bake had."""
+    chosen = chosen_options(group)
+    return tuple(
+        option.panel.label
+        for name, option in OPTIONS.items()
+        if option.panel is not None
+        and name not in ignored
+        and chosen.get(name, option.default) != getattr(settings, name)
+    )
 
 
 def _chosen(option: Option, value: Any) -> bool:
