@@ -34,6 +34,7 @@ from .ragged import run_chunks, run_numbers, run_starts
 from .sampling import (
     concentric_disk,
     cosine_hemisphere,
+    directions_to_triangles,
     hash_keys,
     orthonormal_basis,
     point_on_each_triangle,
@@ -77,6 +78,7 @@ __all__ = [
     "connected_components",
     "connected_faces",
     "cosine_hemisphere",
+    "directions_to_triangles",
     "double_area_vectors",
     "edge_distances",
     "fill_chunks",

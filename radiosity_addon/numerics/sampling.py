@@ -148,6 +148,52 @@ def point_on_each_triangle(triangles: FloatArray, u: FloatArray) -> FloatArray:
     return points.reshape(*triangles.shape[:-2], 3)
 
 
+def directions_to_triangles(triangles: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Carry points of the unit square to directions in which triangles are seen, uniform in solid angle.
+
+    Arvo, Stratified sampling of spherical triangles (1995). The angles' sum is as good as rounding lets it be
+    for triangles that look large.
+
+    triangles (n, 3, 3): Corners, relative to where they are seen from.
+    u (n, 2) float in [0, 1].
+    Returns directions (n, 3), unit, and solid angles (n,) [sr].
+    """
+    unit = np.asarray(u, dtype=np.float64)
+    a, b, c = _unit(triangles).transpose(1, 0, 2)
+    plane_ab, plane_bc, plane_ac = (_unit(np.cross(*pair)) for pair in ((a, b), (b, c), (a, c)))
+    alpha = _angle(plane_ab, plane_ac)
+    angles = alpha + _angle(-plane_ab, plane_bc) + _angle(plane_ac, plane_bc)
+    solid_angle = np.maximum(angles - np.pi, 0.0)
+    # An arc from b to a place on the side from a to c cuts off the first part.
+    sine, cosine = np.sin(unit[:, 0] * solid_angle - alpha), np.cos(unit[:, 0] * solid_angle - alpha)
+    x, y = cosine - np.cos(alpha), sine + np.sin(alpha) * _dot(a, b)
+    divisor = (y * sine + x * cosine) * np.sin(alpha)
+    height = ((y * cosine - x * sine) * np.cos(alpha) - y) / np.where(divisor == 0.0, 1.0, divisor)
+    place = _between(a, c, np.where(divisor == 0.0, 1.0, height))
+    return _between(b, place, 1.0 - unit[:, 1] * (1.0 - _dot(place, b))), solid_angle
+
+
+def _between(pole: FloatArray, toward: FloatArray, height: FloatArray) -> FloatArray:
+    """Return (n, 3) directions of cosine `height` (n,) to a pole, turned from it toward others."""
+    height = np.clip(height, -1.0, 1.0)[:, None]
+    aside = _unit(toward - _dot(toward, pole)[:, None] * pole)
+    return np.asarray(height * pole + np.sqrt(1.0 - height**2) * aside)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, 1e-300))
+
+
+def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("nk,nk->n", one, other))
+
+
+def _angle(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return (n,) the angles between unit vectors."""
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), _dot(one, other)))
+
+
 def concentric_disk(u: FloatArray) -> FloatArray:
     """Carry points of the unit square onto the unit disk, keeping them uniform.
 

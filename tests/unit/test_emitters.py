@@ -10,11 +10,11 @@ from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import SolverSettings, solve
-from radiosity_addon.solver.emitters import emitters
+from radiosity_addon.solver.emitters import emitter_groups, emitters
 from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.gather.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.gather.soft_shadows import ShadowShare
-from tests.rooms import gray_scene, rectangle
+from tests.rooms import gray_scene, rectangle, sphere
 from tests.vectors import normals_of
 
 OFFSET = 1e-6
@@ -107,6 +107,64 @@ def test_a_hidden_face_far_off_does_not_darken_what_lies_close_before_a_large_on
     truth = factor[:, :2].sum(axis=1) / factor.sum(axis=1)
     assert (truth < 0.999).mean() > 0.5
     np.testing.assert_allclose(share, truth, atol=0.01)
+
+
+def test_around_a_bulb_no_ray_is_blocked_by_the_bulb() -> None:
+    """Its inside shines as well, and faces every point from across: together half of all rays would be blocked."""
+    bulb = sphere(2)[:, [0, 2, 1]] * 0.1
+    scene = gray_scene(bulb, 0.5, np.ones((len(bulb), 3)), two_sided=np.ones(len(bulb), dtype=bool))
+    caster = EmbreeCaster(bulb)
+    outer, inner = emitter_groups(scene, Faces(scene), caster)
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(300, 3))
+    points *= rng.uniform(0.15, 3.0, (300, 1)) / np.linalg.norm(points, axis=1, keepdims=True)
+    at = Footprints(points, -points / np.linalg.norm(points, axis=1, keepdims=True), np.arange(300))
+    for group, expected in ((outer, 1.0), (inner, 0.0)):
+        gain = group.unit_irradiance(at.points, at.normals)
+        assert (gain > 1e-4).all()
+        share = ShadowShare(caster, group, SpreadPoints(at, 0), 0).at_points(gain, 16)
+        np.testing.assert_allclose(share, expected, atol=1e-12)
+
+
+def test_a_footprint_that_a_panel_cuts_gets_all_light_of_its_sides() -> None:
+    """A post stands in a shining panel: what is above it sees its upper side alone, what is below the lower."""
+    panel = rectangle((-1, -1, 0), (0, 2, 0), (2, 0, 0))
+    scene = gray_scene(panel, 0.5, np.ones((2, 3)), two_sided=np.ones(2, dtype=bool))
+    caster = EmbreeCaster(panel)
+    points, normals = np.array([[0.0, 0.0, -0.002]]), np.array([[1.0, 0.0, 0.0]])
+
+    def sampler(rows: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return points[rows, None] + 0.02 * (u[..., 1:] - 0.5) * np.array([0.0, 0.0, 1.0])
+
+    at = Footprints(points, normals, np.arange(1), sampler)
+    spread = SpreadPoints(at, 1)
+    groups = emitter_groups(scene, Faces(scene), caster)
+    assert len(groups) == 2
+    gains = [spread.gain(group, 0.05) for group in groups]
+    shares = [
+        ShadowShare(caster, group, spread, 0).at_points(gain, 16)
+        for group, gain in zip(groups, gains, strict=True)
+    ]
+    np.testing.assert_allclose(shares, 1.0, atol=1e-12)
+    # Half of a wall's hemisphere is above it.
+    assert sum(gains)[0] == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("many", [1, 256])
+def test_rays_from_points_carry_what_faces_send_there(many: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their mean weight is the irradiance."""
+    monkeypatch.setattr(emitters, "MANY", many)
+    panel = rectangle((-1, -1, 0.01), (0, 2, 0), (2, 0, 0), 4)
+    group, rays = group_of(panel, 1e-6), 4096
+    points = np.random.default_rng(8).uniform((-0.5, -0.5, -0.02), (0.5, 0.5, 0.005), (20, 3))
+    normals = np.tile([0.8, 0.0, 0.6], (20, 1))
+    start, up = np.repeat(points, rays, axis=0), np.repeat(normals, rays, axis=0)
+    unit = stratified_square(np.arange(20), rays)
+    directions, distances, weights = group.rays_from(start, up, unit.reshape(-1, 2))
+    mean, truth = weights.reshape(20, -1).mean(axis=1), factors(panel, points, normals).sum(axis=1)
+    np.testing.assert_allclose(mean, truth, rtol=0.02)
+    assert mean.mean() == pytest.approx(truth.mean(), rel=2e-3)
+    np.testing.assert_allclose((start + directions * distances[:, None])[:, 2], 0.01 - 1e-6, atol=1e-9)
 
 
 def test_rays_end_just_before_the_surface_and_meet_nothing_on_the_way() -> None:

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.numerics import point_on_each_triangle, points_on_triangles, sampling
+from radiosity_addon.form_factors import point_to_polygon
+from radiosity_addon.numerics import (
+    directions_to_triangles,
+    point_on_each_triangle,
+    points_on_triangles,
+    sampling,
+)
 
 
 @pytest.mark.parametrize("first", [0, 16, 65536 - 16, 65536, 1 << 20])
@@ -127,3 +133,20 @@ def test_a_point_on_each_triangle_is_the_first_of_many_there() -> None:
     np.testing.assert_array_equal(point_on_each_triangle(triangles, u), expected)
     np.testing.assert_array_equal(point_on_each_triangle(triangles[:, 0], u[:, 0]), np.array(expected)[:, 0])
     assert point_on_each_triangle(triangles[:0], u[:0]).shape == (0, 4, 3)
+
+
+def test_directions_to_triangles_fill_them_evenly() -> None:
+    """All meet the triangle; their mean cosine is its form factor, π of it over the solid angle."""
+    rng = np.random.default_rng(1)
+    unit = sampling.stratified_square(np.arange(1), 1 << 14)[0]
+    for _ in range(20):
+        corners = rng.normal(size=(3, 3)) * [1.0, 1.0, 0.2] + [0.0, 0.0, 0.6]
+        directions, solid_angle = directions_to_triangles(np.broadcast_to(corners, (len(unit), 3, 3)), unit)
+        np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-12)
+        assert (np.linalg.solve(corners.T, directions.T) >= -1e-9).all()
+        a, b, c = corners / np.linalg.norm(corners, axis=1, keepdims=True)
+        # Van Oosterom and Strackee, The solid angle of a plane triangle (1983).
+        expected = 2.0 * np.arctan2(abs(np.dot(a, np.cross(b, c))), 1.0 + a @ b + b @ c + a @ c)
+        np.testing.assert_allclose(solid_angle, expected, rtol=1e-9)
+        factor = point_to_polygon(np.zeros((2, 3)), [[0, 0, 1]] * 2, [corners, corners[[0, 2, 1]]]).max()
+        assert np.maximum(directions[:, 2], 0.0).mean() * expected / np.pi == pytest.approx(factor, rel=3e-3)

@@ -7,6 +7,7 @@ import numpy as np
 from ...form_factors import point_to_polygon, ray_geometry_term, throughput
 from ...numerics import (
     Array,
+    directions_to_triangles,
     numbered,
     pick_in_rows,
     pick_in_runs,
@@ -191,6 +192,40 @@ class EmitterGroup:
             sent = np.where(chosen > 0, radiance_of_radiosity(thrown) / np.maximum(chosen, 1e-300), 0.0)
             weights[rows] = _balanced(sent, face, len(self._corners))
         return directions, distances, weights
+
+    def rays_from(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Aim a ray from each of (n, 3) points by (n, 2) numbers, in proportion to what the faces send there.
+
+        For points next to a face: most of its light comes from a small spot of it, which uniform ones miss.
+
+        Returns directions (n, 3), distances (n,), and weights (n,): their mean is the unoccluded irradiance
+            per unit of exitance.
+        """
+        if self._tree is not None:
+            directions, distances, _ = self.shadow_rays(points, normals, u[:, None])
+            return directions[:, 0], distances[:, 0], self.unit_irradiance(points, normals)
+        directions, (distances, weights) = np.empty((len(points), 3)), np.empty((2, len(points)))
+        step = max(BLOCK_PAIRS // len(self._corners), 1)
+        for first in range(0, len(points), step):
+            rows = slice(first, first + step)
+            found = self._rays_to_near(points[rows], normals[rows], u[rows])
+            directions[rows], distances[rows], weights[rows] = found
+        return directions, distances, weights
+
+    def _rays_to_near(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
+        factors = self.factors(points, normals)
+        face, along = (part[:, 0] for part in pick_in_rows(factors, u[:, :1]))
+        chosen = np.take_along_axis(factors, face[:, None], axis=1)[:, 0]
+        corners, facing = self._corners[face] - points[:, None], self._normals[face]
+        directions, solid_angle = directions_to_triangles(corners, np.stack([along, u[:, 1]], axis=1))
+        ahead = np.minimum(np.einsum("nk,nk->n", directions, facing), -1e-12)
+        distances = np.einsum("nk,nk->n", corners[:, 0], facing) / ahead
+        rise = np.maximum(np.einsum("nk,nk->n", directions, normals), 0.0)
+        sent = np.divide(rise * solid_angle * self._level[face], np.pi * chosen,
+                         out=np.zeros_like(chosen), where=chosen > 0.0)  # fmt: skip
+        ends = directions * distances[:, None] + self._offset * facing
+        distances = np.linalg.norm(ends, axis=1)
+        return ends / np.maximum(distances, 1e-300)[:, None], distances, sent * factors.sum(axis=1)
 
     def _rays_by_tree(
         self, tree: EmitterTree, points: Array, normals: Array, u: Array

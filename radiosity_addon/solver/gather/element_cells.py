@@ -5,11 +5,10 @@ what a ray gets, one from inside a closed box would bring the lit floor outside 
 answers as the part of it that sees its *anchor*, a point inside. Hits that do not see the anchor
 are answered by one of the leaf's sixteenths, each again the part that sees its own anchor.
 
-Nor does a leaf look alike from near: next to a wall it is darker than in its middle, and the strip of it
-that a panel covers is black, though the panel's gap lets lines of sight pass. So a leaf much larger than
-the texels answers as a whole only from farther than half its width. Rays from nearer are answered by a cell
-no wider than twice their length, or than a few texels; and below a hood only by a cell below it, as with
-texels (`lightmap/texels/occlusion.py`).
+Nor does a leaf look alike all over: next to a wall it is darker than in its middle, and what a panel or a
+picture covers is black, though the gap below it lets lines of sight pass. So no leaf or cell answers that is
+wider than a few texels; and below a hood only a cell below it does, as with texels
+(`lightmap/texels/occlusion.py`).
 """
 
 from __future__ import annotations
@@ -31,14 +30,7 @@ MAX_DEPTH = 3
 """How many times a large leaf is cut into sixteenths."""
 
 FINE = 3.0
-"""What is not wider than this many texels answers from near as well, and is not cut further."""
-
-NEAR = 0.5
-"""From nearer than this many times its width a large leaf or cell does not answer."""
-
-WIDEST = 8.0
-"""What is wider than this many texels does not answer: a picture that hangs before a wall
-lets lines of sight pass between them, and would darken all of it."""
+"""What is not wider than this many texels answers as a whole."""
 
 HOOD = 0.25
 """What is nearer above a large leaf than this part of a texel's width hoods it."""
@@ -60,7 +52,7 @@ class ElementCells:
     """Numbers the parts of all leaves: the e elements first, then the cells of each.
 
     hierarchy: Is not refined any more.
-    finest: Width of a texel [m]; with endless ones every leaf answers as a whole from near as well.
+    finest: Width of a texel [m]; with endless ones every leaf answers as a whole.
     """
 
     def __init__(self, hierarchy: Hierarchy, caster: RayCaster, finest: float = np.inf) -> None:
@@ -99,19 +91,12 @@ class ElementCells:
         hits, leaf = hits.take(rows), leaf[rows]
         normal = self._hierarchy.normal_of(leaf)
         position = self._positions(hits) + self._lift(normal)
-        size, level = self._size[leaf], np.zeros(len(leaf), dtype=np.int8)
-        distance = np.minimum(hits.distance, NEAR * WIDEST * self._finest)
-        for finer in range(MAX_DEPTH):
-            level += (
-                (distance * _cells(finer) < NEAR * size)
-                & self._is_large(leaf)
-                & (self._depth[leaf] > finer)
-            )
+        level = np.where(self._is_large(leaf), self._depth[leaf], 0)
         whole = np.flatnonzero(level == 0)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
         level[whole[~free_segment(self._caster, position[whole], anchor)]] = 1
-        near = np.flatnonzero(level)
-        part[rows[near]] = self._cells_at(leaf[near], position[near], normal[near], level[near])
+        cut = np.flatnonzero(level)
+        part[rows[cut]] = self._cells_at(leaf[cut], position[cut], normal[cut], level[cut])
         return part
 
     def footprints(self, part: Array) -> Footprints:

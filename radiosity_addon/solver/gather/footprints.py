@@ -150,7 +150,7 @@ class SpreadPoints:
         apart = self._apart[rows, self._farthest[rows]]
         return np.asarray(self.at.points[rows] + apart)
 
-    def width(self, part: slice) -> Array:
+    def width(self, part: slice | Array) -> Array:
         """Return (r,) how far a footprint reaches from its center, twice: about its width [m]."""
         return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
 
