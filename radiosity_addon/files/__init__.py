@@ -20,7 +20,7 @@ from .baked_files import (
     text_of,
     without,
 )
-from .export_reports import FORMS, LIGHTMAPS_OF, images_described, is_outdated, lightmap_digests
+from .export_reports import FORMS, LIGHTMAPS_OF, forms_in, images_described, is_outdated, lightmap_digests
 from .file_names import (
     BLEND_NAME,
     EXPORT_FOLDER,
@@ -59,6 +59,7 @@ __all__ = [
     "digest_of_file",
     "entries",
     "folded",
+    "forms_in",
     "highest_page",
     "images_described",
     "is_as_written",

@@ -26,6 +26,12 @@ def lightmap_digests(report: Mapping[str, Any]) -> dict[str, str]:
     return {name: listed[name]["sha256"] for name in sorted(images_described(report)) if name in listed}
 
 
+def forms_in(exported: Mapping[str, Any]) -> list[str]:
+    """Return the forms that an export's report lists; none for a report of anything else."""
+    listed = exported.get(FORMS)
+    return [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
+
+
 def is_outdated(exported: Mapping[str, Any], lightmaps: Mapping[str, str]) -> bool:
     """Return whether an export's report is of other lightmaps than these."""
-    return FORMS in exported and exported.get(LIGHTMAPS_OF) != dict(lightmaps)
+    return bool(forms_in(exported)) and exported.get(LIGHTMAPS_OF) != dict(lightmaps)

@@ -89,6 +89,16 @@ def test_nothing_is_exported_without_a_form_or_a_bake(baked: Path) -> None:
     assert not bpy.ops.radiosity.export.poll()
 
 
+def test_what_is_in_the_place_of_the_panels_export_is_an_error_message(baked: Path) -> None:
+    place = baked / "lightmaps" / "room_Scene_export"
+    place.write_text("mine")
+    before = contents()
+    with pytest.raises(RuntimeError, match="room_Scene_export"):
+        bpy.ops.radiosity.export()
+    assert place.read_text() == "mine"
+    assert contents() == before
+
+
 def test_blenders_own_exporter_names_lightmaps(baked: Path, enabled: None) -> None:
     before = contents()
     path = baked / "own.glb"

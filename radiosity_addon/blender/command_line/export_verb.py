@@ -16,7 +16,6 @@ from ...files import (
     OWNER,
     REPORT_NAME,
     NoReportError,
-    Owner,
     images_described,
     is_as_written,
     lightmap_digests,
@@ -25,7 +24,7 @@ from ...files import (
 from ...options import Form
 from ..exporting.export import run_export
 from ..files.files import open_scene
-from ..files.output import OutputFolder
+from .export_places import output_of_export
 from .verbs import registered, run_through
 
 
@@ -47,8 +46,7 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
             raise SceneError(f"'{folder / BLEND_NAME}' has no scene '{report[OWNER]['scene']}': bake again")
         if bpy.context.window is not None:
             bpy.context.window.scene = scene
-        owner = Owner(str(folder / BLEND_NAME), scene.name)
-        output = OutputFolder(folder / EXPORT_FOLDER, overwrite=allowed.overwrite, owner=owner)
+        output = output_of_export(folder, scene.name, allowed)
         digests = lightmap_digests(report)
         made = run_through(run_export(bpy.context, form, output, digests), console, interrupts)
         lines = [f"exported into {folder / EXPORT_FOLDER}", *(f"  {name}" for name in made.files)]

@@ -103,6 +103,7 @@ def _run(
                     console,
                     interrupts,
                     preview=not request.no_preview,
+                    form=form,
                 )
             elif settings is not None:
                 verbs.bake(
@@ -117,6 +118,7 @@ def _run(
                     console,
                     interrupts,
                     preview=not request.no_preview,
+                    form=form,
                 )
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)

@@ -5,6 +5,8 @@ The verb `export`, the option `--export` and the button *Export* all run this.
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -55,6 +57,13 @@ class ExportReport:
     notes: tuple[str, ...] = ()
 
 
+def foreseen_files(form: Form) -> list[str]:
+    """Return the names of the files that an export writes in any case."""
+    fixed = [LIT, INDEX_NAME, *([BAKED] if form.lit_scene else []), *([VIEWER] if form.viewer else [])]
+    (stem,) = PLAIN_NAMES.shared_pages(1)
+    return [*fixed, *static_files(form), f"{stem}.exr", f"{stem}.ktx2"]
+
+
 def run_export(
     context: bpy.types.Context, form: Form, folder: OutputFolder, lightmaps: Mapping[str, str]
 ) -> Generator[Status, None, ExportReport]:
@@ -68,9 +77,8 @@ def run_export(
         If the scene shows no lightmap that can be exported, or a file cannot be written.
     """
     with folder as output:
+        output.expect(foreseen_files(form))
         files = static_files(form)
-        fixed = [LIT, INDEX_NAME, *([BAKED] if form.lit_scene else []), *([VIEWER] if form.viewer else [])]
-        output.expect([*fixed, *files])
         yield Status("export", 0.0)
         with closing(export_scene(context)) as scene:
             light = _Lightmaps.of(scene)
@@ -127,7 +135,7 @@ class _Lightmaps:
         taken: set[str] = set()
         names = [PLAIN_NAMES.shared_pages(len(pages), group) for group in ("", *(each[0] for each in groups))]
         stems = tuple(tuple(unique_names(of, "", taken)) for of in names)
-        notes = []
+        notes = list(dict.fromkeys(note for material in scene.materials for note in material.notes))
         if shown.light == "indirect":
             notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
         uneven = [
@@ -250,11 +258,20 @@ def _gltf(context: bpy.types.Context, scene: ExportScene, folder: Path, *, keeps
                 export_import_convert_lighting_mode="SPEC",
             )
         written = path.read_bytes()
-    except (RuntimeError, OSError) as error:
-        raise BakeError(f"Blender could not write the glTF file: {' '.join(str(error).split())}") from error
+    except RuntimeError as error:
+        raise _failure(str(error), folder / LIT) from error
     finally:
         path.unlink(missing_ok=True)
     return Glb.of_bytes(written)
+
+
+def _failure(message: str, path: Path) -> OSError | BakeError:
+    """Return what Blender's exporter failed of: its message is a traceback."""
+    system = re.search(r"\[Errno (\d+)\]", message)
+    if system is not None:
+        return OSError(int(system[1]), os.strerror(int(system[1])), str(path))
+    said = re.findall(r"^\s*(\w+(?:Error|Exception)\b.*)$", message, re.MULTILINE)
+    return BakeError(f"Blender's glTF exporter failed: {' '.join((said or [message])[-1].split())}")
 
 
 @contextmanager
