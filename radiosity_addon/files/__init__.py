@@ -20,7 +20,15 @@ from .baked_files import (
     text_of,
     without,
 )
-from .export_reports import FORMS, LIGHTMAPS_OF, forms_in, images_described, is_outdated, lightmap_digests
+from .export_reports import (
+    Mix,
+    export_record,
+    forms_in,
+    images_described,
+    is_outdated,
+    lightmap_digests,
+    older_files,
+)
 from .file_names import (
     BLEND_NAME,
     EXPORT_FOLDER,
@@ -43,10 +51,8 @@ __all__ = [
     "DIGEST",
     "EXPORT_FOLDER",
     "FILE",
-    "FORMS",
     "KEPT",
     "LIGHTMAPS",
-    "LIGHTMAPS_OF",
     "LISTED",
     "OWNER",
     "PLAIN_NAMES",
@@ -54,10 +60,12 @@ __all__ = [
     "REPORT_NAME",
     "SIDECAR_NAME",
     "FileNames",
+    "Mix",
     "NoReportError",
     "Owner",
     "digest_of_file",
     "entries",
+    "export_record",
     "folded",
     "forms_in",
     "highest_page",
@@ -67,6 +75,7 @@ __all__ = [
     "is_bake_name",
     "is_outdated",
     "lightmap_digests",
+    "older_files",
     "read_report",
     "reports_in",
     "sealed",

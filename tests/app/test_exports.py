@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from radiosity_addon.exports import Glb, read_half_exr, read_ktx2
+from radiosity_addon.files import is_outdated, lightmap_digests
 
-from .conftest import QUICK, Baked, read_pixels, read_report
+from .conftest import QUICK, Baked, read_pixels, read_report, save
 
 Run = Callable[..., object]
 
@@ -97,6 +98,43 @@ def test_a_bake_exports_at_once_with_room_for_filters(run: Run, room: Path, tmp_
     done = run("export", tmp_path / "out", "--forms", "glb")
     assert done.code == 0
     assert "2 texels apart" in done.out
+
+
+def test_what_another_form_leaves_of_earlier_lightmaps_is_named(run: Run, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("bake", room, "--output", out, *QUICK, "--export", "web").code == 0
+    assert "earlier" not in run("export", out, "--forms", "godot").out
+    assert run("bake", room, "--output", out, *QUICK, "--seed", "1", "--export", "web", "--quiet").code == 0
+    done = run("bake", room, "--output", out, *QUICK, "--padding", "4", "--export", "godot")
+    for name in ("scene_baked.glb", "viewer.html"):
+        assert f"note: {name} is of earlier lightmaps" in done.out
+    done = run("export", out, "--forms", "godot")
+    assert "note: viewer.html is of earlier lightmaps" in done.out
+    assert is_outdated_export(out)
+    done = run("export", out, "--forms", "web")
+    assert "earlier" not in done.out
+    assert not is_outdated_export(out)
+
+
+def is_outdated_export(folder: Path) -> bool:
+    """Return whether the export next to a bake is of earlier lightmaps."""
+    exported, baked = read_report(folder / "export"), read_report(folder)
+    return is_outdated(exported, folder / "export", lightmap_digests(baked))
+
+
+def test_a_relight_makes_an_export_outdated(run: Run, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("bake", room, "--output", out, *QUICK, "--keep", "--export", "glb").code == 0
+    bpy.ops.wm.open_mainfile(filepath=str(room))
+    bpy.data.lights["Lamp"].energy = 50.0
+    save(room)
+    done = run("bake", room, "--output", out, "--relight", "--no-preview")
+    assert done.code == 0
+    place = out / "export"
+    words = f"export {out} --forms glb"
+    assert f"warning: the export in {place} is older than the lightmaps: run {words}\n" in done.out
+    assert run("bake", room, "--output", out, "--relight", "--export", "glb", "--quiet").code == 0
+    assert not is_outdated_export(out)
 
 
 def test_files_of_others_are_never_replaced(run: Run, folder: Path) -> None:

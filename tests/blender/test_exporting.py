@@ -18,6 +18,7 @@ from radiosity_addon.blender.files.files import open_scene
 from radiosity_addon.blender.operators.export_operators import export_folder, is_export_outdated
 from radiosity_addon.exports import Glb
 
+from . import group_bake
 from .hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
 
 
@@ -78,6 +79,21 @@ def test_an_export_of_other_lightmaps_is_outdated(baked: Path) -> None:
     assert not is_export_outdated(bpy.context)
     image = next(each for each in bpy.data.images if each.get("radiosity_page") is not None)
     image["radiosity_version"] = "another"
+    assert is_export_outdated(bpy.context)
+
+
+def test_an_export_of_other_sliders_is_outdated(registered: None, tmp_path: Path) -> None:
+    group_bake.lit_plane()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    (tmp_path / "lightmaps").mkdir()
+    group_bake.bake_groups(folder=tmp_path / "lightmaps")
+    group_bake.slide("Lamps", 2.0, (1.0, 0.5, 0.25))
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert not is_export_outdated(bpy.context)
+    index = json.loads((export_folder(bpy.context) / "lightmaps.json").read_text(encoding="utf-8"))
+    factors = {group["name"]: group["factor"] for group in index["light_groups"]}
+    assert factors == {"Lamps": [2.0, 1.0, 0.5], "Glow": [1.0, 1.0, 1.0]}
+    group_bake.slide("Lamps", 1.0)
     assert is_export_outdated(bpy.context)
 
 

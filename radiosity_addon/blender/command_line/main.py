@@ -59,7 +59,13 @@ def main(
             check_keeping(request, settings)
         wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
         form = None if wanted is None else forms_of(wanted)
-        if settings is not None and form is not None and settings.padding is None and not settings.mip_levels:
+        if (
+            settings is not None
+            and form is not None
+            and not request.relight
+            and settings.padding is None
+            and not settings.mip_levels
+        ):
             settings = replace(settings, padding=ENGINE_PADDING)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)

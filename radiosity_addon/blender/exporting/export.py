@@ -34,7 +34,7 @@ from ...exports import (
     write_half_exr,
     write_ktx2,
 )
-from ...files import FORMS, LIGHTMAPS_OF, PLAIN_NAMES, unique_names
+from ...files import PLAIN_NAMES, export_record, older_files, unique_names
 from ...numerics import Array
 from ...options import EFFICACY, ENGINE_PADDING, Form
 from ..datablocks.quiet_output import silenced
@@ -109,10 +109,12 @@ def run_export(
             path = output.staging / name
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(data)
-        report = {"version": REPORT_VERSION, FORMS: list(form.names), LIGHTMAPS_OF: dict(lightmaps)}
-        output.write_report(BakeReport(report))
+        left = {BAKED, VIEWER} - files.keys()
+        record = export_record(output.earlier, form.names, lightmaps, light.mix, left)
+        output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
         output.publish()
-    return ExportReport(tuple(sorted(files)), tuple(light.notes))
+        older = [f"{name} is of earlier lightmaps" for name in older_files(record, output.path)]
+    return ExportReport(tuple(sorted(files)), (*light.notes, *older))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +151,11 @@ class _Lightmaps:
                 f"compressed textures bake with a padding of {ENGINE_PADDING}"
             )
         return cls(shown.light, pages, groups, stems, tuple(notes))
+
+    @property
+    def mix(self) -> dict[str, tuple[float, float, float]]:
+        """What each light group is multiplied by."""
+        return {name: factor for name, factor, _ in self.groups}
 
     @property
     def keeps_lamps(self) -> bool:
