@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 from radiosity_addon.exports import Glb, read_half_exr, read_ktx2
 from radiosity_addon.files import is_outdated, lightmap_digests
 
@@ -214,6 +215,36 @@ def test_light_groups_are_mixed_and_exported_apart(run: Run, room: Path, tmp_pat
     images = [read_half_exr((folder / group["pages"][0]["exr"]).read_bytes()) for group in groups.values()]
     total = read_half_exr((folder / index["pages"][0]["exr"]).read_bytes())
     np.testing.assert_allclose(sum(images), total, rtol=2e-3, atol=1e-5)
+
+
+def test_light_groups_are_exported_as_the_sliders_of_the_baked_file_stand(
+    run: Run, room: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    words = ("--light-group", "Kitchen=Lamp", "--export", "web", "--sum-groups")
+    assert run("bake", room, "--output", out, *QUICK, *words).code == 0
+    index = json.loads((out / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    assert index["light_groups"] == []
+    assert "lightmap_Kitchen.ktx2" not in files_in(out / "export")
+    whole = read_half_exr((out / "export" / "lightmap.exr").read_bytes())
+
+    bpy.ops.wm.open_mainfile(filepath=str(out / "baked.blend"))
+    (mixer,) = mixers()
+    (sliders,) = [each for each in sliders_of(mixer) if each.name == "Kitchen"]
+    sliders.strength.default_value, sliders.color.default_value = 2.0, (1.0, 0.5, 0.25, 1.0)
+    save(out / "baked.blend")
+    done = run("export", out, "--forms", "glb", "--sum-groups")
+    assert (done.code, done.err) == (0, "")
+    assert "note: baked.blend was changed since it was baked: it is exported as it is" in done.out
+    mixed = read_half_exr((out / "export" / "lightmap.exr").read_bytes())
+    np.testing.assert_allclose(mixed, whole * (2.0, 1.0, 0.5), rtol=2e-3, atol=1e-5)
+
+    assert run("export", out, "--forms", "glb").code == 0
+    index = json.loads((out / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    (kitchen,) = [group for group in index["light_groups"] if group["name"] == "Kitchen"]
+    assert kitchen["factor"] == [2.0, 1.0, 0.5]
+    own = read_half_exr((out / "export" / kitchen["pages"][0]["exr"]).read_bytes())
+    np.testing.assert_allclose(own, whole, rtol=2e-3, atol=1e-5)
 
 
 def test_an_exported_scene_shows_its_lightmap_in_an_empty_blender(run: Run, folder: Path) -> None:

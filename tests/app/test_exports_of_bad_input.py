@@ -51,6 +51,13 @@ def squares(names: Sequence[str]) -> None:
         add_quad(name, ((x, 0, 0), (x + 1, 0, 0), (x + 1, 1, 0), (x, 1, 0)))
 
 
+def test_a_baked_file_that_is_damaged_is_refused(run: Run, folder: Path) -> None:
+    path = folder / "baked.blend"
+    path.write_bytes(path.read_bytes()[:1000])
+    refused(run("export", folder, "--forms", "glb"), path)
+    assert not (folder / "export").exists()
+
+
 def test_names_that_differ_in_case_alone_give_files_of_their_own(run: Run, tmp_path: Path) -> None:
     squares(("Tree", "tree", "TREE"))
     for name in ("Lamp", "lamp", "2"):

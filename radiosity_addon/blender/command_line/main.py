@@ -58,7 +58,7 @@ def main(
             check_plot(request.plot)
             check_keeping(request, settings)
         wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
-        form = None if wanted is None else forms_of(wanted)
+        form = None if wanted is None else forms_of(wanted, request.sum_groups)
         if (
             settings is not None
             and form is not None

@@ -81,7 +81,7 @@ def run_export(
         files = static_files(form)
         yield Status("export", 0.0)
         with closing(export_scene(context)) as scene:
-            light = _Lightmaps.of(scene)
+            light = _Lightmaps.of(scene, sum_groups=form.sum_groups)
             output.expect(light.file_names)
             yield Status("colors", 0.1)
             colors = _evaluated(context, scene, light, every=form.lit_scene)
@@ -119,21 +119,28 @@ def run_export(
 
 @dataclass(frozen=True, eq=False)
 class _Lightmaps:
-    """The pages of an export as arrays, and the names of their files."""
+    """The pages of an export as arrays, and the names of their files.
+
+    groups: Light groups that have lightmaps of their own, with their factors.
+    mix: The factors of all light groups.
+    """
 
     light: str
     pages: tuple[Array, ...]
     groups: tuple[tuple[str, tuple[float, float, float], tuple[Array, ...]], ...]
+    mix: dict[str, tuple[float, float, float]]
     stems: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, scene: ExportScene) -> _Lightmaps:
+    def of(cls, scene: ExportScene, *, sum_groups: bool) -> _Lightmaps:
         shown = scene.shown
         pages = tuple(shown.page(number) for number in range(len(shown.images)))
         groups = tuple(
-            (group.name, group.factor, tuple(map(light_of, group.images))) for group in shown.groups
+            (group.name, group.factor, tuple(map(light_of, group.images)))
+            for group in (() if sum_groups else shown.groups)
         )
+        mix = {group.name: group.factor for group in shown.groups}
         taken: set[str] = set()
         names = [PLAIN_NAMES.shared_pages(len(pages), group) for group in ("", *(each[0] for each in groups))]
         stems = tuple(tuple(unique_names(of, "", taken)) for of in names)
@@ -150,12 +157,7 @@ class _Lightmaps:
                 f"charts are {shown.padding} texels apart, enough for bilinear filters: for bicubic ones and "
                 f"compressed textures bake with a padding of {ENGINE_PADDING}"
             )
-        return cls(shown.light, pages, groups, stems, tuple(notes))
-
-    @property
-    def mix(self) -> dict[str, tuple[float, float, float]]:
-        """What each light group is multiplied by."""
-        return {name: factor for name, factor, _ in self.groups}
+        return cls(shown.light, pages, groups, mix, stems, tuple(notes))
 
     @property
     def keeps_lamps(self) -> bool:
@@ -223,7 +225,7 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
 
 def evaluated_materials(context: bpy.types.Context, scene: ExportScene) -> None:
     """Have the temporary scene's materials read images of what glTF cannot express of them."""
-    _show_images(scene, _evaluated(context, scene, _Lightmaps.of(scene), every=False))
+    _show_images(scene, _evaluated(context, scene, _Lightmaps.of(scene, sum_groups=True), every=False))
 
 
 def _show_images(scene: ExportScene, colors: _Colors) -> None:

@@ -29,7 +29,7 @@ def chosen_forms(context: bpy.types.Context) -> Form:
     """Return the forms that the panel's check boxes choose."""
     settings = context.scene.radiosity
     names = [choice.value for choice in EXPORT_FORMS if getattr(settings, f"export_{choice.value}")]
-    return Form(tuple(names))
+    return Form(tuple(names), settings.sum_groups)
 
 
 def export_folder(context: bpy.types.Context) -> Path | None:
