@@ -53,7 +53,7 @@ def _to_lay_out(item: BakeObject, triangles: Array, scale: float, kind: Array) -
     if item.glass is not None:
         uv = None if uv is None else uv[item.lit]
         triangles, polygon, kind = triangles[item.lit], polygon[item.lit], kind[item.lit]
-    return AtlasInput(item.name, triangles, polygon, uv, scale, kind)
+    return AtlasInput(item.name, triangles, polygon, uv, scale, kind, item.page)
 
 
 def _with_glass(item: BakeObject, placed: AtlasObject) -> AtlasObject:

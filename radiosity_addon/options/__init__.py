@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
 from .choices import EXPORT_FORMS
-from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
+from .constants import EFFICACY, MAX_GROUPS, MAX_PAGES, MAX_RESOLUTION, OTHERS
 from .export_forms import ENGINE_PADDING, SUM_GROUPS, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Choice, Option, option, options_of, plain
@@ -24,6 +24,7 @@ __all__ = [
     "LAST_BAKE",
     "MAIN",
     "MAX_GROUPS",
+    "MAX_PAGES",
     "MAX_RESOLUTION",
     "METHODS",
     "OPTIONS",

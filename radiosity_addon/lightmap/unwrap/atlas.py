@@ -150,24 +150,27 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
     """Pack objects on as many pages as are requested or needed."""
     density = options.texel_density
     totals = _totals(layouts, options.limits.padding)
-    count = len(layouts)
+    count, wanted = len(layouts), [layout.source.page for layout in layouts]
     if options.shared:
         count = options.pages
         if density is not None:
             count = totals.least_pages(density, options.limits.side)
+    count = max(count, *wanted)
+    before: list[list[int]] = []
     while True:
         common = totals.density(float(count * options.resolution**2)) if density is None else density
         texels = totals.texels(common)
-        groups = assign_pages(texels, count) if options.shared else [[each] for each in range(count)]
+        groups = assign_pages(texels, count, wanted) if options.shared else [[each] for each in range(count)]
         laid: _Laid = []
+        group: list[int] = []
         try:
             for group in groups:
                 laid.append((group, _pack_group([layouts[each] for each in group], options, progress)))
         except BakeError:
             # What does not fit at the requested density may fit on more pages.
-            if density is None or len(groups) == len(layouts):
+            if density is None or len(group) == 1 or groups == before:
                 raise
-            count = max(count, len(groups)) + 1
+            count, before = max(count, len(groups)) + 1, groups
             continue
         return laid
 

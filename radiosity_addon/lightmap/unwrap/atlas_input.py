@@ -30,6 +30,8 @@ class AtlasInput:
         Its texels per meter, relative to the other objects.
     kind : (n,) int or None
         Only triangles of one kind share texels; None if all are alike.
+    page : int
+        The shared page that it is to be on, from 1; 0 for any.
     """
 
     name: str
@@ -38,6 +40,7 @@ class AtlasInput:
     uv: Float32 | None = None
     scale: float = 1.0
     kind: NDArray[np.int64] | None = None
+    page: int = 0
 
 
 @dataclass(frozen=True)
