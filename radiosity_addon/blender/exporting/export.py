@@ -215,7 +215,7 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
         sizes.append((factor * width, factor * height))
     if not needed:
         return {}
-    with bake_units(context, scene) as objects:
+    with bake_units(scene) as objects:
         return {
             channel: evaluate_channel(context, scene, objects, sizes, channel)
             for channel in CHANNELS
