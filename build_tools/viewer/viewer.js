@@ -125,7 +125,7 @@ function luminance(color) {
 function illuminanceAt(lit, hit) {
   const lightmap = hit && [hit.object.material].flat()[0].userData.lightmap;
   if (!lightmap || !hit.uv1) return '';
-  const light = lit.irradiance(lightmap.page, hit.uv1.x, hit.uv1.y);
+  const light = lit.irradiance(lightmap.page, ...lit.onPage(hit.object, hit.uv1.x, hit.uv1.y));
   const lux = lit.index.lumens_per_watt * luminance(light);
   const plain = lux >= 100 ? lux.toFixed(0) : lux.toPrecision(3);
   return `${plain} lx · ${luminance(light).toPrecision(3)} W/m² · ${hit.object.name}`;

@@ -36,6 +36,7 @@ def lay_out(
         Limits(settings.max_resolution, padding(settings)),
         settings.unwrap_seconds,
         settings.threads,
+        settings.pack == "rectangles" and settings.atlas == "shared",
     )
     atlas = build_atlas(inputs, options, progress)
     texels = [

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
 from .choices import EXPORT_FORMS
-from .constants import EFFICACY, MAX_GROUPS, MAX_PAGES, MAX_RESOLUTION, OTHERS
+from .constants import EFFICACY, MAX_GROUPS, MAX_PAGES, MAX_RESOLUTION, OTHERS, TEXEL_STEPS
 from .export_forms import ENGINE_PADDING, SUM_GROUPS, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Choice, Option, option, options_of, plain
@@ -35,6 +35,7 @@ __all__ = [
     "SOLVER",
     "SUM_GROUPS",
     "SYMMETRIC_ONLY",
+    "TEXEL_STEPS",
     "UNBOUNDED",
     "BakeSettings",
     "Choice",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .choices import ASSEMBLIES, ATLASES, FORMATS, LIGHTS, METHOD_CHOICES, QUALITIES, QUANTITIES
+from .choices import ASSEMBLIES, ATLASES, FORMATS, LIGHTS, METHOD_CHOICES, PACKS, QUALITIES, QUANTITIES
 from .combinations import check_combinations
 from .constants import MAX_PAGES, MAX_RESOLUTION
 from .methods import ALL, ITERATIVE, LINKS, MATRIX
@@ -79,6 +79,14 @@ class BakeSettings:
         "Pages",
         limits=(1, MAX_PAGES),
         panel=PanelRow("Pages", soft_high=16, only_if=(("atlas", "shared"), *AS_A_WHOLE)),
+    )
+    pack: str = option(
+        "charts",
+        "How charts are packed into shared images",
+        "Layout",
+        choices=PACKS,
+        preset=True,
+        panel=PanelRow("Pack", only_if=(("atlas", "shared"),)),
     )
     max_resolution: int = option(
         MAX_RESOLUTION,

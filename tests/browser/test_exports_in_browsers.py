@@ -22,6 +22,7 @@ from radiosity_addon.blender.command_line.main import main
 from tests.browser.browser import ROOT, bundled, chromium, drawn, viewer
 from tests.browser.reference import inner_pixels, rendered
 from tests.browser.textured_room import build
+from tests.trees import build_trees
 
 pytestmark = pytest.mark.one_blender
 
@@ -62,6 +63,25 @@ def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     radiosity_addon.unregister()
 
 
+@pytest.fixture(scope="module")
+def trees(tmp_path_factory: pytest.TempPathFactory) -> Exported:
+    """Nine trees that are one mesh, and what Cycles shows."""
+    chromium()
+    folder = tmp_path_factory.mktemp("trees")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    build_trees(9)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "trees.blend"))
+    radiosity_addon.register()
+    words = [str(folder / "trees.blend"), "--output", str(folder / "out"), "--pack", "rectangles"]
+    assert main(["bake", *words, *DRAFT]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "out" / "baked.blend"))
+    inner = inner_pixels(WIDTH, HEIGHT)
+    images = [rendered(folder, WIDTH, HEIGHT, lightmap_only=only) for only in (False, True)]
+    programs = {"three": bundled("three_page", folder)}
+    radiosity_addon.unregister()
+    return Exported(folder / "out" / "export", *images, inner, programs)
+
+
 def errors(found: np.ndarray, expected: np.ndarray, inner: np.ndarray) -> tuple[float, float]:
     """Return the relative RMS error, and the median of relative errors."""
     light = expected[..., :3].sum(axis=-1)
@@ -93,6 +113,17 @@ def test_engines_show_what_cycles_shows(
     assert found[1] < median
 
 
+@pytest.mark.parametrize(("form", "largest"), [("exr", 0.003), ("ktx2", 0.006)])
+def test_instances_of_one_mesh_show_their_own_part_of_the_lightmap(
+    trees: Exported, form: str, largest: float
+) -> None:
+    index = json.loads((trees.folder / "lightmaps.json").read_text(encoding="utf-8"))
+    assert len({tuple(entry["offset"]) for entry in index["nodes"]}) == 10
+    pixels = drawn(trees.folder, trees.programs["three"], WIDTH, HEIGHT, form=form)
+    found = errors(pixels, trees.cycles, trees.inner)
+    assert found[0] < largest
+
+
 @pytest.mark.full  # the same lightmap as with colors
 def test_the_lightmap_alone(exported: Exported) -> None:
     pixels = drawn(exported.folder, exported.programs["three"], WIDTH, HEIGHT, form="exr", only="1")
@@ -109,6 +140,15 @@ def _leaves(exported: Exported) -> np.ndarray:
 
 
 def test_the_validator_finds_no_error(exported: Exported) -> None:
+    check_validity(exported.folder)
+
+
+def test_the_validator_finds_no_error_in_shared_meshes(trees: Exported) -> None:
+    check_validity(trees.folder)
+
+
+def check_validity(folder: Path) -> None:
+    """Have Khronos' validator look at both files of an export."""
     program = (
         "const v=require('gltf-validator'),fs=require('fs'),{dirname,join}=require('path');"
         "const read=(f)=>new Uint8Array(fs.readFileSync(f));"
@@ -116,7 +156,7 @@ def test_the_validator_finds_no_error(exported: Exported) -> None:
         "Promise.all(process.argv.slice(1).map(f=>v.validateBytes(read(f),next(f))))"
         ".then(r=>console.log(JSON.stringify(r.map(x=>x.issues))))"
     )
-    files = [str(exported.folder / name) for name in ("scene.glb", "scene_baked.glb")]
+    files = [str(folder / name) for name in ("scene.glb", "scene_baked.glb")]
     environment = {
         "NODE_PATH": str(viewer_bundle.node_packages(ROOT)),
         "PATH": "/usr/local/bin:/usr/bin:/bin",

@@ -22,12 +22,14 @@ from ...exports import (
     Glb,
     GroupEntry,
     LightmapIndex,
+    LightmapPlace,
     NodeEntry,
     PageEntry,
     emissive_only,
     lightmap_index,
     png_of_linear,
     resampled,
+    share_meshes,
     static_files,
     viewer_page,
     with_lightmaps,
@@ -88,14 +90,15 @@ def run_export(
             yield Status("glTF", 0.4)
             _show_images(scene, colors)
             written = _gltf(context, scene, output.staging, keeps_lamps=light.keeps_lamps)
+            shared, places = share_meshes(written, scene.names, scene.baked, light.sizes)
             lit = with_lightmaps(
-                written, scene.names, dict(enumerate(light.ktx2_names)), lamps=light.keeps_lamps
+                shared, scene.names, dict(enumerate(light.ktx2_names)), lamps=light.keeps_lamps
             )
             files[LIT] = lit.to_bytes()
             yield Status("lightmaps", 0.6)
             images = light.files()
             files |= images
-            files[INDEX_NAME] = lightmap_index(light.index(scene)).encode()
+            files[INDEX_NAME] = lightmap_index(light.index(scene, places)).encode()
             if form.lit_scene:
                 yield Status("baked glTF", 0.8)
                 pages = _light_pages(scene, light, colors)
@@ -172,6 +175,11 @@ class _Lightmaps:
     def file_names(self) -> list[str]:
         return [f"{stem}{ending}" for of in self.stems for stem in of for ending in (".exr", ".ktx2")]
 
+    @property
+    def sizes(self) -> dict[int, tuple[int, int]]:
+        """Width and height of each page."""
+        return {number: (page.shape[1], page.shape[0]) for number, page in enumerate(self.pages)}
+
     def files(self) -> dict[str, bytes]:
         """Return the files of all pages."""
         found = {}
@@ -180,8 +188,11 @@ class _Lightmaps:
                 found[f"{stem}.exr"], found[f"{stem}.ktx2"] = write_half_exr(page), write_ktx2(page)
         return found
 
-    def index(self, scene: ExportScene) -> LightmapIndex:
-        """Return what lightmaps.json says."""
+    def index(self, scene: ExportScene, places: Mapping[str, LightmapPlace]) -> LightmapIndex:
+        """Return what lightmaps.json says.
+
+        places: Of objects that share a mesh.
+        """
         entries = [
             tuple(_entry(page, stem) for page, stem in zip(pages, stems, strict=True))
             for stems, pages in zip(self.stems, (self.pages, *(each[2] for each in self.groups)), strict=True)
@@ -190,7 +201,10 @@ class _Lightmaps:
             GroupEntry(name, factor, of)
             for (name, factor, _), of in zip(self.groups, entries[1:], strict=True)
         ]
-        nodes = [NodeEntry(name, page) for name, page in scene.baked.items()]
+        nodes = []
+        for name, page in scene.baked.items():
+            place = places.get(name, LightmapPlace((1.0, 1.0), (0.0, 0.0)))
+            nodes.append(NodeEntry(name, page, scale=place.scale, offset=place.offset))
         lamps = [] if self.keeps_lamps else lamps_in(scene.objects)
         return LightmapIndex(self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes)
 

@@ -146,6 +146,7 @@ class _Copies:
             self._meshes,
             {each.material.name: (each.name, each.page) for each in made.materials},
             [each.material.name for each in made.materials if each.glows],
+            [each.material.name for each in made.materials if each.evaluated],
         )
 
     def _page(self, material: bpy.types.Material | None) -> int | None:

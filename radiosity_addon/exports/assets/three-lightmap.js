@@ -41,17 +41,21 @@ export class LitScene {
     this.materials = new Map();
     this.scene.traverse((mesh) => {
       if (!mesh.isMesh) return;
-      const list = [mesh.material].flat().map((material) => this.#lit(material, matte));
+      const list = [mesh.material].flat().map((material) => this.#lit(material, matte, placeOf(mesh)));
       mesh.material = Array.isArray(mesh.material) ? list : list[0];
     });
   }
 
-  #lit(material, matte) {
+  #lit(material, matte, place) {
     const lightmap = material.userData.lightmap;
     if (!lightmap) return material;
-    if (!this.materials.has(material)) this.materials.set(material, matte ? matteOf(material) : material);
-    const made = this.materials.get(material);
-    made.lightMap = this.textures[lightmap.page];
+    const key = place ? `${material.uuid} ${place.scale} ${place.offset}` : material;
+    if (!this.materials.has(key)) {
+      this.materials.set(key, matte ? matteOf(material) : place ? material.clone() : material);
+    }
+    const made = this.materials.get(key);
+    made.userData = { ...material.userData, place };
+    made.lightMap = placed(this.textures[lightmap.page], place);
     made.lightMapIntensity = Math.PI; // texels hold H/π, and three.js divides by π
     made.needsUpdate = true;
     return made;
@@ -74,9 +78,15 @@ export class LitScene {
       const texture = this.textures[number] = prepared(
         new DataTexture(sum, page.width, page.height, RGBAFormat, FloatType));
       for (const made of this.materials.values()) {
-        if (made.userData.lightmap.page === number) made.lightMap = texture;
+        if (made.userData.lightmap.page === number) made.lightMap = placed(texture, made.userData.place);
       }
     });
+  }
+
+  /** Where a coordinate of a mesh's second set is on its page: instances of one mesh have a place each. */
+  onPage(mesh, u, v) {
+    const { scale, offset } = placeOf(mesh) ?? { scale: [1, 1], offset: [0, 0] };
+    return [u * scale[0] + offset[0], v * scale[1] + offset[1]];
   }
 
   /** The irradiance [W/m²] at a lightmap coordinate of a page: texel H/π times π, bilinear. */
@@ -94,6 +104,21 @@ export class LitScene {
     }
     return found;
   }
+}
+
+/** The scale and offset of a mesh that instances share: on its node, which a mesh of several materials is below. */
+function placeOf(mesh) {
+  return [mesh, mesh.parent].map((each) => each?.userData.lightmap).find((told) => told?.scale) ?? null;
+}
+
+/** A texture at a place: a clone, which shares the image. */
+function placed(texture, place) {
+  if (!place) return texture;
+  const clone = texture.clone();
+  clone.repeat.fromArray(place.scale);
+  clone.offset.fromArray(place.offset);
+  clone.needsUpdate = true;
+  return clone;
 }
 
 function clamp(value, count) {

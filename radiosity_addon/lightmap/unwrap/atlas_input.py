@@ -61,6 +61,8 @@ class AtlasOptions:
         Of every page.
     unwrap_seconds : float
         After so long an object's rest is cut into charts by the directions its faces look.
+    rectangles : bool
+        Each object has a rectangle of its own, and instances of a shape have the same layout in theirs.
     threads : int
         Pieces of large objects that are cut at once; 0 means all cores.
     """
@@ -72,3 +74,4 @@ class AtlasOptions:
     limits: Limits = field(default_factory=Limits)
     unwrap_seconds: float = 60.0
     threads: int = 0
+    rectangles: bool = False
