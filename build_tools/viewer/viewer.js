@@ -133,10 +133,10 @@ function illuminanceAt(lit, hit) {
 
 function lightmapOnly(material, only) {
   material.userData.kept ??= { color: material.color.clone(), map: material.map, metalness: material.metalness,
-    emissive: material.emissive.clone(), aoMap: material.aoMap };
+    emissiveIntensity: material.emissiveIntensity, aoMap: material.aoMap };
   const kept = material.userData.kept;
   material.color.copy(only ? new Color(1, 1, 1) : kept.color);
-  material.emissive.copy(only ? new Color(0, 0, 0) : kept.emissive);
+  material.emissiveIntensity = only ? 0 : kept.emissiveIntensity;
   // Cut-outs are in the image of the color.
   material.map = only && !material.alphaTest && !material.transparent ? null : kept.map;
   if (kept.metalness !== undefined) material.metalness = only ? 0 : kept.metalness;

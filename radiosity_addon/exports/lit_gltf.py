@@ -40,6 +40,7 @@ class ExportedNames:
     materials mapping of str to (str, int or None): The same, and the page of their lightmap.
     glowing: Those materials, by their names in the written file, that emit light.
     in_lightmap_uvs: Those with images in the lightmap's UVs.
+    light_groups mapping of str to str: The light group of those whose emission is in one.
     """
 
     scene: str = ""
@@ -48,6 +49,7 @@ class ExportedNames:
     materials: Mapping[str, tuple[str, int | None]] = field(default_factory=dict)
     glowing: Collection[str] = ()
     in_lightmap_uvs: Collection[str] = ()
+    light_groups: Mapping[str, str] = field(default_factory=dict)
 
 
 def with_lightmaps(written: Glb, names: ExportedNames, files: Mapping[int, str], *, lamps: bool) -> Glb:
@@ -63,6 +65,7 @@ def with_lightmaps(written: Glb, names: ExportedNames, files: Mapping[int, str],
     _rename(glb.json, names)
     textures: dict[int, int] = {}
     for material in glb.json.get("materials", ()):
+        group = names.light_groups.get(material["name"])
         material["name"], page = names.materials.get(material["name"], (material["name"], None))
         if page is None:
             continue
@@ -71,6 +74,8 @@ def with_lightmaps(written: Glb, names: ExportedNames, files: Mapping[int, str],
             sampler = glb.add("samplers", dict(_CLAMPED))
             textures[page] = glb.add("textures", {"source": image, "sampler": sampler})
         _name_lightmap(material, page, textures[page], files[page])
+        if group is not None:
+            material["extras"][LIGHTMAP]["light_group"] = group
         glb.uses(MOZ_LIGHTMAP)
     glb.merge_equal()
     return glb

@@ -202,6 +202,23 @@ def test_the_viewer_mixes_light_groups_and_measures_light(tmp_path: Path) -> Non
         assert "Wall" in text
 
 
+def test_surfaces_that_glow_follow_their_light_group(tmp_path: Path) -> None:
+    chromium()
+    build(tmp_path / "room.blend")
+    radiosity_addon.register()
+    words = ["bake", str(tmp_path / "room.blend"), "--output", str(tmp_path / "out"), *DRAFT[2:]]
+    assert main([*words, "--resolution", "32", "--light-group", "Day=Panel"]) == 0
+    radiosity_addon.unregister()
+    find = "[...viewer.shiny.materials.values()].find(m => m.userData.lightmap.light_group)"
+    with viewer(tmp_path / "out" / "export" / "viewer.html", 300, 300) as shown:
+        assert shown.evaluated(f"{find}.userData.lightmap.light_group") == "Day"
+        before = shown.evaluated(f"{find}.emissive.toArray()")
+        assert min(before) > 0
+        shown.evaluated("viewer.shiny.mix({ Day: [2, 0.5, 0] }); viewer.draw()")
+        after = shown.evaluated(f"{find}.emissive.toArray()")
+        np.testing.assert_allclose(after, np.array(before) * (2, 0.5, 0), rtol=1e-6)
+
+
 def test_the_bundled_program_is_of_its_sources(tmp_path: Path) -> None:
     chromium()
     viewer_bundle.bundle(ROOT, tmp_path / "viewer.js")

@@ -37,6 +37,7 @@ export async function loadLit(url, { matte = false, read = null, loader = new GL
 export class LitScene {
   constructor(gltf, index, pages, groups, matte) {
     Object.assign(this, { gltf, scene: gltf.scene, index, pages, groups });
+    for (const group of groups) group.exported = [...group.factor];
     this.textures = pages.map(textureOf);
     this.materials = new Map();
     this.scene.traverse((mesh) => {
@@ -54,7 +55,7 @@ export class LitScene {
       this.materials.set(key, matte ? matteOf(material) : place ? material.clone() : material);
     }
     const made = this.materials.get(key);
-    made.userData = { ...material.userData, place };
+    made.userData = { ...material.userData, place, glow: made.emissive?.clone() };
     made.lightMap = placed(this.textures[lightmap.page], place);
     made.lightMapIntensity = Math.PI; // texels hold H/π, and three.js divides by π
     made.needsUpdate = true;
@@ -64,6 +65,13 @@ export class LitScene {
   /** Mix light groups: factors by name, color times strength; those that are not named keep theirs. */
   mix(factors) {
     for (const group of this.groups) group.factor = factors[group.name] ?? group.factor;
+    for (const made of this.materials.values()) {
+      const { glow, lightmap } = made.userData;
+      const group = this.groups.find((each) => each.name === lightmap.light_group);
+      if (!group || !glow) continue;
+      const ratio = group.factor.map((factor, c) => factor / (group.exported[c] || 1));
+      made.emissive.setRGB(glow.r * ratio[0], glow.g * ratio[1], glow.b * ratio[2]);
+    }
     this.pages.forEach((page, number) => {
       const sum = new Float32Array(4 * page.width * page.height).fill(1);
       for (let texel = 0; texel < sum.length; texel += 4) sum[texel] = sum[texel + 1] = sum[texel + 2] = 0;
