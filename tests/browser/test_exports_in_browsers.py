@@ -26,7 +26,9 @@ from tests.trees import build_trees
 
 pytestmark = pytest.mark.one_blender
 
-WIDTH, HEIGHT = 320, 240
+SIZE, SQUARE = (320, 240), (240, 240)
+"""Of pictures: the exported camera is that of the scene's own format, which is square in the Cornell box."""
+
 MAX_CONTRAST = 0.25
 """Between a pixel's neighbors, relative to their mean."""
 
@@ -42,6 +44,7 @@ class Exported:
     cycles_lightmap: np.ndarray
     inner: np.ndarray
     programs: dict[str, Path]
+    size: tuple[int, int] = SIZE
 
 
 @pytest.fixture(scope="module", params=["room", pytest.param("cornell", marks=pytest.mark.full)])
@@ -56,10 +59,11 @@ def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     radiosity_addon.register()
     assert main(["bake", *scene, "--output", str(folder / "out"), *DRAFT]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(folder / "out" / "baked.blend"))
-    inner = inner_pixels(WIDTH, HEIGHT)
-    images = [rendered(folder, WIDTH, HEIGHT, lightmap_only=only) for only in (False, True)]
+    size = SIZE if request.param == "room" else SQUARE
+    inner = inner_pixels(*size)
+    images = [rendered(folder, *size, lightmap_only=only) for only in (False, True)]
     programs = {name: bundled(f"{name}_page", folder) for name in ("three", "babylon")}
-    yield Exported(folder / "out" / "export", *images, inner, programs)
+    yield Exported(folder / "out" / "export", *images, inner, programs, size)
     radiosity_addon.unregister()
 
 
@@ -75,8 +79,8 @@ def trees(tmp_path_factory: pytest.TempPathFactory) -> Exported:
     words = [str(folder / "trees.blend"), "--output", str(folder / "out"), "--pack", "rectangles"]
     assert main(["bake", *words, *DRAFT]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(folder / "out" / "baked.blend"))
-    inner = inner_pixels(WIDTH, HEIGHT)
-    images = [rendered(folder, WIDTH, HEIGHT, lightmap_only=only) for only in (False, True)]
+    inner = inner_pixels(*SIZE)
+    images = [rendered(folder, *SIZE, lightmap_only=only) for only in (False, True)]
     programs = {"three": bundled("three_page", folder)}
     radiosity_addon.unregister()
     return Exported(folder / "out" / "export", *images, inner, programs)
@@ -107,7 +111,7 @@ def errors(found: np.ndarray, expected: np.ndarray, inner: np.ndarray) -> tuple[
 def test_engines_show_what_cycles_shows(
     exported: Exported, engine: str, form: str, largest: float, median: float
 ) -> None:
-    pixels = drawn(exported.folder, exported.programs[engine], WIDTH, HEIGHT, form=form)
+    pixels = drawn(exported.folder, exported.programs[engine], *exported.size, form=form)
     found = errors(pixels, exported.cycles, exported.inner)
     assert found[0] < largest
     assert found[1] < median
@@ -119,14 +123,14 @@ def test_instances_of_one_mesh_show_their_own_part_of_the_lightmap(
 ) -> None:
     index = json.loads((trees.folder / "lightmaps.json").read_text(encoding="utf-8"))
     assert len({tuple(entry["offset"]) for entry in index["nodes"]}) == 10
-    pixels = drawn(trees.folder, trees.programs["three"], WIDTH, HEIGHT, form=form)
+    pixels = drawn(trees.folder, trees.programs["three"], *trees.size, form=form)
     found = errors(pixels, trees.cycles, trees.inner)
     assert found[0] < largest
 
 
 @pytest.mark.full  # the same lightmap as with colors
 def test_the_lightmap_alone(exported: Exported) -> None:
-    pixels = drawn(exported.folder, exported.programs["three"], WIDTH, HEIGHT, form="exr", only="1")
+    pixels = drawn(exported.folder, exported.programs["three"], *exported.size, form="exr", only="1")
     white = pixels[..., 1] > 0.0
     found = errors(pixels, exported.cycles_lightmap, exported.inner & white & ~_leaves(exported))
     assert found[0] < 0.003
