@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from radiosity_addon.bake.quality import QUALITY_SETTINGS, quality_of
-from radiosity_addon.cli.command_options import BAKE_COMMAND, EVERY_COMMAND, EXPORT_COMMAND
+from radiosity_addon.cli.command_options import BAKE_COMMAND, EVERY_COMMAND, EVERY_EXPORT, EXPORT_COMMAND
 from radiosity_addon.options import (
     MAIN,
     METHODS,
@@ -40,7 +40,12 @@ panel, such a number shows *set by quality* until a value is entered."""
 
 def page() -> str:
     """Return the page as the table of options makes it."""
-    commands = [*BAKE_COMMAND.values(), *EXPORT_COMMAND.values(), *EVERY_COMMAND.values()]
+    commands = [
+        *BAKE_COMMAND.values(),
+        *EXPORT_COMMAND.values(),
+        *EVERY_EXPORT.values(),
+        *EVERY_COMMAND.values(),
+    ]
     rows = ((_flag(option), _meaning(option)) for option in commands)
     parts = [_introduction(), "## Command", _table(("option", "meaning"), rows)]
     for section, part in SECTIONS.items():

@@ -125,7 +125,7 @@ function luminance(color) {
 function illuminanceAt(lit, hit) {
   const lightmap = hit && [hit.object.material].flat()[0].userData.lightmap;
   if (!lightmap || !hit.uv1) return '';
-  const light = lit.irradiance(lightmap.page, hit.uv1.x, hit.uv1.y);
+  const light = lit.irradiance(lightmap.page, ...lit.onPage(hit.object, hit.uv1.x, hit.uv1.y));
   const lux = lit.index.lumens_per_watt * luminance(light);
   const plain = lux >= 100 ? lux.toFixed(0) : lux.toPrecision(3);
   return `${plain} lx · ${luminance(light).toPrecision(3)} W/m² · ${hit.object.name}`;
@@ -133,10 +133,10 @@ function illuminanceAt(lit, hit) {
 
 function lightmapOnly(material, only) {
   material.userData.kept ??= { color: material.color.clone(), map: material.map, metalness: material.metalness,
-    emissive: material.emissive.clone(), aoMap: material.aoMap };
+    emissiveIntensity: material.emissiveIntensity, aoMap: material.aoMap };
   const kept = material.userData.kept;
   material.color.copy(only ? new Color(1, 1, 1) : kept.color);
-  material.emissive.copy(only ? new Color(0, 0, 0) : kept.emissive);
+  material.emissiveIntensity = only ? 0 : kept.emissiveIntensity;
   // Cut-outs are in the image of the color.
   material.map = only && !material.alphaTest && !material.transparent ? null : kept.map;
   if (kept.metalness !== undefined) material.metalness = only ? 0 : kept.metalness;

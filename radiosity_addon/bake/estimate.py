@@ -80,6 +80,7 @@ class LightmappedObject:
     scale: Its texels per meter, relative to the other objects.
     box (2, 3): Around it [m]; None if it is not known.
     keeps_uvs: Whether its layout is kept.
+    page: The shared page that it is to be on, from 1; 0 for any.
     """
 
     name: str
@@ -88,6 +89,7 @@ class LightmappedObject:
     scale: float = 1.0
     box: Array | None = None
     keeps_uvs: bool = False
+    page: int = 0
 
     @property
     def surface(self) -> float:
@@ -203,6 +205,7 @@ def estimate_of(bake_scene: BakeScene, settings: BakeSettings) -> Estimate:
             item.texel_scale * item.thinning,
             np.stack([triangles[item.rows].min(axis=(0, 1)), triangles[item.rows].max(axis=(0, 1))]),
             item.uv is not None,
+            item.page,
         )
         for item in bake_scene.objects
         if item.bake and item.count
@@ -261,7 +264,8 @@ def _pages(objects: Sequence[LightmappedObject], settings: BakeSettings) -> tupl
     if density is not None:
         count = math.ceil(float(taken.sum()) / largest**2)
     shared = settings.atlas != "per-object"
-    groups = assign_pages(taken, count) if shared else [[number] for number in range(len(objects))]
+    wanted = [item.page for item in objects]
+    groups = assign_pages(taken, count, wanted) if shared else [[each] for each in range(len(objects))]
     pages, texels = [], [0.0] * len(objects)
     for group in groups:
         size, finest = settings.resolution, density

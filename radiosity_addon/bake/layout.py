@@ -36,6 +36,7 @@ def lay_out(
         Limits(settings.max_resolution, padding(settings)),
         settings.unwrap_seconds,
         settings.threads,
+        settings.pack == "rectangles" and settings.atlas == "shared",
     )
     atlas = build_atlas(inputs, options, progress)
     texels = [
@@ -53,7 +54,7 @@ def _to_lay_out(item: BakeObject, triangles: Array, scale: float, kind: Array) -
     if item.glass is not None:
         uv = None if uv is None else uv[item.lit]
         triangles, polygon, kind = triangles[item.lit], polygon[item.lit], kind[item.lit]
-    return AtlasInput(item.name, triangles, polygon, uv, scale, kind)
+    return AtlasInput(item.name, triangles, polygon, uv, scale, kind, item.page)
 
 
 def _with_glass(item: BakeObject, placed: AtlasObject) -> AtlasObject:

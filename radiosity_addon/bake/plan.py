@@ -1,9 +1,9 @@
 """Which bake a scene needs, decided once, after the export: all of it, what changed, what moved, or nothing.
 
-An object has changed if its triangles, their shading normals, its reflectance or opacity, its texel scale
-or its part in the light have. Where lamps, emission, the world or the settings have changed, everything is
-baked. Lightmaps that stay are not touched: the shadows and bounces that changed objects throw on them are
-not renewed.
+An object has changed if its triangles, their shading normals, its reflectance or opacity, its texel scale,
+its page or its part in the light have. Where lamps, emission, the world or the settings have changed,
+everything is baked. Lightmaps that stay are not touched: the shadows and bounces that changed objects throw
+on them are not renewed.
 """
 
 from __future__ import annotations

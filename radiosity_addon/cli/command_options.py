@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..options import option, options_of
+from ..options import SUM_GROUPS, option, options_of
 
 SECTION = "Command"
 
@@ -66,6 +66,13 @@ class _ExportCommand:
 
 
 @dataclass(frozen=True)
+class _EveryExport:
+    """Options of `export`, and of `bake` with `--export`."""
+
+    sum_groups: bool = option(False, SUM_GROUPS, SECTION)
+
+
+@dataclass(frozen=True)
 class _EveryCommand:
     """Options of every command."""
 
@@ -83,6 +90,9 @@ BAKE_COMMAND = options_of(_BakeCommand)
 
 EXPORT_COMMAND = options_of(_ExportCommand)
 """Options of the command `export`."""
+
+EVERY_EXPORT = options_of(_EveryExport)
+"""Options of both commands that export."""
 
 EVERY_COMMAND = options_of(_EveryCommand)
 """Options of all commands."""

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from ..base import UsageError
 from ..options import METHODS, OPTIONS, SECTIONS, BakeSettings, GroupSetting, Option, plain
-from .command_options import BAKE_COMMAND, EVERY_COMMAND, EXPORT_COMMAND
+from .command_options import BAKE_COMMAND, EVERY_COMMAND, EVERY_EXPORT, EXPORT_COMMAND
 from .path_checks import checked_folder, checked_name, checked_path
 
 BUNDLED_OUTPUT = Path("out/cornell")
@@ -95,7 +95,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help=".blend, .glb, .gltf or .obj; without it the file Blender has open, or the bundled Cornell box",
     )
-    _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_COMMAND.values()))
+    _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_EXPORT.values(), *EVERY_COMMAND.values()))
     for section in SECTIONS:
         options = [option for option in OPTIONS.values() if option.section == section]
         if options:
@@ -104,7 +104,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
 
 def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=checked_folder, metavar="DIR", help="the folder that was baked into")
-    _add_options(parser, (*EXPORT_COMMAND.values(), *EVERY_COMMAND.values()))
+    _add_options(parser, (*EXPORT_COMMAND.values(), *EVERY_EXPORT.values(), *EVERY_COMMAND.values()))
     parser.set_defaults(forms=EXPORT_COMMAND["forms"].default)
 
 

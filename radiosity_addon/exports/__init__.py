@@ -14,6 +14,7 @@ from .lit_gltf import LIGHTMAP_CHANNEL, ExportedNames, emissive_only, with_light
 from .pages import resampled
 from .png8 import png_of_linear, srgb_of_linear
 from .shared_exponent import decode_rgb9e5, encode_rgb9e5
+from .shared_meshes import LightmapPlace, share_meshes
 from .web_page import viewer_page
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "GlbError",
     "GroupEntry",
     "LightmapIndex",
+    "LightmapPlace",
     "NodeEntry",
     "PageEntry",
     "decode_rgb9e5",
@@ -34,6 +36,7 @@ __all__ = [
     "read_half_exr",
     "read_ktx2",
     "resampled",
+    "share_meshes",
     "srgb_of_linear",
     "static_files",
     "viewer_page",

@@ -39,6 +39,8 @@ class ExportedNames:
     nodes, meshes mapping of str to str: Their names in the user's file.
     materials mapping of str to (str, int or None): The same, and the page of their lightmap.
     glowing: Those materials, by their names in the written file, that emit light.
+    in_lightmap_uvs: Those with images in the lightmap's UVs.
+    light_groups mapping of str to str: The light group of those whose emission is in one.
     """
 
     scene: str = ""
@@ -46,6 +48,8 @@ class ExportedNames:
     meshes: Mapping[str, str] = field(default_factory=dict)
     materials: Mapping[str, tuple[str, int | None]] = field(default_factory=dict)
     glowing: Collection[str] = ()
+    in_lightmap_uvs: Collection[str] = ()
+    light_groups: Mapping[str, str] = field(default_factory=dict)
 
 
 def with_lightmaps(written: Glb, names: ExportedNames, files: Mapping[int, str], *, lamps: bool) -> Glb:
@@ -55,12 +59,13 @@ def with_lightmaps(written: Glb, names: ExportedNames, files: Mapping[int, str],
     lamps: Whether lamps stay: those that are not in the lightmap.
     """
     glb = written.copy()
-    _strip(glb.json)
+    strip(glb.json)
     if not lamps:
         _remove_lamps(glb.json)
     _rename(glb.json, names)
     textures: dict[int, int] = {}
     for material in glb.json.get("materials", ()):
+        group = names.light_groups.get(material["name"])
         material["name"], page = names.materials.get(material["name"], (material["name"], None))
         if page is None:
             continue
@@ -69,6 +74,8 @@ def with_lightmaps(written: Glb, names: ExportedNames, files: Mapping[int, str],
             sampler = glb.add("samplers", dict(_CLAMPED))
             textures[page] = glb.add("textures", {"source": image, "sampler": sampler})
         _name_lightmap(material, page, textures[page], files[page])
+        if group is not None:
+            material["extras"][LIGHTMAP]["light_group"] = group
         glb.uses(MOZ_LIGHTMAP)
     glb.merge_equal()
     return glb
@@ -100,7 +107,7 @@ def emissive_only(
     pages: For each page, and whether it is of glowing materials, an image in sRGB and the radiance of white.
     """
     glb = written.copy()
-    _strip(glb.json)
+    strip(glb.json)
     _remove_lamps(glb.json)
     _rename(glb.json, names)
     textures: dict[tuple[int, bool], int] = {}
@@ -139,7 +146,7 @@ def _emit(material: Json, texture: int, strength: float) -> None:
     }
 
 
-def _strip(content: Json) -> None:
+def strip(content: Json) -> None:
     """Remove our custom properties: they are for Blender."""
     for kind in ("scenes", "nodes", "meshes", "materials", "cameras", "images", "animations"):
         for item in content.get(kind, ()):

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
 from .choices import EXPORT_FORMS
-from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
-from .export_forms import ENGINE_PADDING, Form, forms_of
+from .constants import EFFICACY, MAX_GROUPS, MAX_PAGES, MAX_RESOLUTION, OTHERS, TEXEL_STEPS
+from .export_forms import ENGINE_PADDING, SUM_GROUPS, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Choice, Option, option, options_of, plain
 from .panel_settings import PANEL_OPTIONS, RELIGHT_GROUP
@@ -24,6 +24,7 @@ __all__ = [
     "LAST_BAKE",
     "MAIN",
     "MAX_GROUPS",
+    "MAX_PAGES",
     "MAX_RESOLUTION",
     "METHODS",
     "OPTIONS",
@@ -32,7 +33,9 @@ __all__ = [
     "RELIGHT_GROUP",
     "SECTIONS",
     "SOLVER",
+    "SUM_GROUPS",
     "SYMMETRIC_ONLY",
+    "TEXEL_STEPS",
     "UNBOUNDED",
     "BakeSettings",
     "Choice",

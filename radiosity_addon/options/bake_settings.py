@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .choices import ASSEMBLIES, ATLASES, FORMATS, LIGHTS, METHOD_CHOICES, QUALITIES, QUANTITIES
+from .choices import ASSEMBLIES, ATLASES, FORMATS, LIGHTS, METHOD_CHOICES, PACKS, QUALITIES, QUANTITIES
 from .combinations import check_combinations
-from .constants import MAX_RESOLUTION
+from .constants import MAX_PAGES, MAX_RESOLUTION
 from .methods import ALL, ITERATIVE, LINKS, MATRIX
 from .option_record import UNBOUNDED, Choice, PanelRow, option, options_of
 
@@ -77,8 +77,16 @@ class BakeSettings:
         1,
         "Number of images for the objects of a shared atlas; set automatically with a density",
         "Pages",
-        limits=(1, 64),
+        limits=(1, MAX_PAGES),
         panel=PanelRow("Pages", soft_high=16, only_if=(("atlas", "shared"), *AS_A_WHOLE)),
+    )
+    pack: str = option(
+        "charts",
+        "How charts are packed into shared images",
+        "Layout",
+        choices=PACKS,
+        preset=True,
+        panel=PanelRow("Pack", only_if=(("atlas", "shared"),)),
     )
     max_resolution: int = option(
         MAX_RESOLUTION,

@@ -26,6 +26,16 @@ ATLASES = (
     Choice("per-object", "Per Object", "An image for each object"),
 )
 
+PACKS = (
+    Choice("charts", "Charts", "All charts of a page together: the most texels for the surface"),
+    Choice(
+        "rectangles",
+        "Rectangles",
+        "Each object in a rectangle of its own: instances have the same UVs but for their offset, so that "
+        "exports hold their mesh once",
+    ),
+)
+
 QUALITIES = (
     Choice("sketch", "Sketch", "Fastest: few rays and coarse elements, to place lamps", number=4),
     Choice("draft", "Draft", "Fast: coarse elements and few rays, to judge the light"),

@@ -5,6 +5,12 @@ from __future__ import annotations
 EFFICACY = 683.0
 """Lumens a watt of green light of 555 nm; taken for all light where nothing else is said [lm/W]."""
 
+TEXEL_STEPS = 256
+"""Of a texel, that corners are on where each object has a rectangle: float32 UVs give them back exactly."""
+
+MAX_PAGES = 64
+"""That objects can share."""
+
 MAX_RESOLUTION = 16384
 """Width and height of the largest page."""
 

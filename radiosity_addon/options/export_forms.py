@@ -9,15 +9,25 @@ from .choices import EXPORT_FORMS
 
 ENGINES = ("godot", "unity", "bevy")
 
+SUM_GROUPS = (
+    "Export light groups only as their sum, as the sliders stand; else also a lightmap of each, which "
+    "viewer.html mixes"
+)
+"""Help of the option on the command line and in the panel."""
+
 ENGINE_PADDING = 4
 """Free texels between charts that bicubic filters, and compressed blocks of 4 × 4, need."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """What an export writes: which parts of the requested forms."""
+    """What an export writes: which parts of the requested forms.
+
+    sum_groups: Light groups have no lightmaps of their own, only their sum by the factors they have.
+    """
 
     names: tuple[str, ...]
+    sum_groups: bool = False
 
     @property
     def lit_scene(self) -> bool:
@@ -35,7 +45,7 @@ class Form:
         return tuple(name for name in ENGINES if name in self.names)
 
 
-def forms_of(text: str) -> Form:
+def forms_of(text: str, sum_groups: bool = False) -> Form:
     """Return the forms of a list such as `web,godot`, without repetition.
 
     Raises UsageError if one is unknown, or there is none.
@@ -47,4 +57,4 @@ def forms_of(text: str) -> Form:
         raise UsageError(
             f"forms to export '{text}': give one or more of {','.join(known)}, separated by commas"
         )
-    return Form(names)
+    return Form(names, sum_groups)

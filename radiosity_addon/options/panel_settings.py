@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .choices import EXPORT_FORMS, SCOPES, SIZE_MODES
+from .export_forms import SUM_GROUPS
 from .option_record import PanelRow, option, options_of
 from .sections import EXPORT, FILES, LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
 
@@ -91,6 +92,7 @@ class _PanelSettings:
     export_godot: bool = _form("godot")
     export_unity: bool = _form("unity")
     export_bevy: bool = _form("bevy")
+    sum_groups: bool = option(False, SUM_GROUPS, EXPORT, panel=PanelRow("Sum Light Groups"))
 
 
 PANEL_OPTIONS = options_of(_PanelSettings)

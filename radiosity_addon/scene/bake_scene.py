@@ -30,6 +30,7 @@ class BakeObject:
     texel_scale: Its texels per meter, relative to the other objects.
     thinning: A further factor, if a bake of part of a scene is to be like one of all of it.
     glass (count,) bool: Triangles that are glass, which get no texels; None for none.
+    page: The shared page that it is to be on, from 1; 0 for any.
     """
 
     name: str
@@ -42,6 +43,7 @@ class BakeObject:
     texel_scale: float = 1.0
     thinning: float = 1.0
     glass: Array | None = None
+    page: int = 0
 
     @property
     def rows(self) -> slice:

@@ -12,9 +12,11 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 from radiosity_addon.exports import Glb, read_half_exr, read_ktx2
+from radiosity_addon.files import is_outdated, lightmap_digests
 
-from .conftest import QUICK, Baked, read_pixels, read_report
+from .conftest import QUICK, Baked, read_pixels, read_report, save
 
 Run = Callable[..., object]
 
@@ -99,6 +101,43 @@ def test_a_bake_exports_at_once_with_room_for_filters(run: Run, room: Path, tmp_
     assert "2 texels apart" in done.out
 
 
+def test_what_another_form_leaves_of_earlier_lightmaps_is_named(run: Run, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("bake", room, "--output", out, *QUICK, "--export", "web").code == 0
+    assert "earlier" not in run("export", out, "--forms", "godot").out
+    assert run("bake", room, "--output", out, *QUICK, "--seed", "1", "--export", "web", "--quiet").code == 0
+    done = run("bake", room, "--output", out, *QUICK, "--padding", "4", "--export", "godot")
+    for name in ("scene_baked.glb", "viewer.html"):
+        assert f"note: {name} is of earlier lightmaps" in done.out
+    done = run("export", out, "--forms", "godot")
+    assert "note: viewer.html is of earlier lightmaps" in done.out
+    assert is_outdated_export(out)
+    done = run("export", out, "--forms", "web")
+    assert "earlier" not in done.out
+    assert not is_outdated_export(out)
+
+
+def is_outdated_export(folder: Path) -> bool:
+    """Return whether the export next to a bake is of earlier lightmaps."""
+    exported, baked = read_report(folder / "export"), read_report(folder)
+    return is_outdated(exported, folder / "export", lightmap_digests(baked))
+
+
+def test_a_relight_makes_an_export_outdated(run: Run, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("bake", room, "--output", out, *QUICK, "--keep", "--export", "glb").code == 0
+    bpy.ops.wm.open_mainfile(filepath=str(room))
+    bpy.data.lights["Lamp"].energy = 50.0
+    save(room)
+    done = run("bake", room, "--output", out, "--relight", "--no-preview")
+    assert done.code == 0
+    place = out / "export"
+    words = f"export {out} --forms glb"
+    assert f"warning: the export in {place} is older than the lightmaps: run {words}\n" in done.out
+    assert run("bake", room, "--output", out, "--relight", "--export", "glb", "--quiet").code == 0
+    assert not is_outdated_export(out)
+
+
 def test_files_of_others_are_never_replaced(run: Run, folder: Path) -> None:
     (folder / "export").mkdir()
     (folder / "export" / "viewer.html").write_text("mine")
@@ -176,6 +215,36 @@ def test_light_groups_are_mixed_and_exported_apart(run: Run, room: Path, tmp_pat
     images = [read_half_exr((folder / group["pages"][0]["exr"]).read_bytes()) for group in groups.values()]
     total = read_half_exr((folder / index["pages"][0]["exr"]).read_bytes())
     np.testing.assert_allclose(sum(images), total, rtol=2e-3, atol=1e-5)
+
+
+def test_light_groups_are_exported_as_the_sliders_of_the_baked_file_stand(
+    run: Run, room: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    words = ("--light-group", "Kitchen=Lamp", "--export", "web", "--sum-groups")
+    assert run("bake", room, "--output", out, *QUICK, *words).code == 0
+    index = json.loads((out / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    assert index["light_groups"] == []
+    assert "lightmap_Kitchen.ktx2" not in files_in(out / "export")
+    whole = read_half_exr((out / "export" / "lightmap.exr").read_bytes())
+
+    bpy.ops.wm.open_mainfile(filepath=str(out / "baked.blend"))
+    (mixer,) = mixers()
+    (sliders,) = [each for each in sliders_of(mixer) if each.name == "Kitchen"]
+    sliders.strength.default_value, sliders.color.default_value = 2.0, (1.0, 0.5, 0.25, 1.0)
+    save(out / "baked.blend")
+    done = run("export", out, "--forms", "glb", "--sum-groups")
+    assert (done.code, done.err) == (0, "")
+    assert "note: baked.blend was changed since it was baked: it is exported as it is" in done.out
+    mixed = read_half_exr((out / "export" / "lightmap.exr").read_bytes())
+    np.testing.assert_allclose(mixed, whole * (2.0, 1.0, 0.5), rtol=2e-3, atol=1e-5)
+
+    assert run("export", out, "--forms", "glb").code == 0
+    index = json.loads((out / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    (kitchen,) = [group for group in index["light_groups"] if group["name"] == "Kitchen"]
+    assert kitchen["factor"] == [2.0, 1.0, 0.5]
+    own = read_half_exr((out / "export" / kitchen["pages"][0]["exr"]).read_bytes())
+    np.testing.assert_allclose(own, whole, rtol=2e-3, atol=1e-5)
 
 
 def test_an_exported_scene_shows_its_lightmap_in_an_empty_blender(run: Run, folder: Path) -> None:

@@ -280,3 +280,21 @@ def test_the_panel_shows_what_is_said_once_next_to_many_warnings_alike(box: bpy.
     last = last_bake.read(box)
     assert last.warning_count == 2
     assert [name for name, _ in last.warnings] == ["slot0", "map"]
+
+
+def test_a_bake_and_a_relight_say_that_the_export_is_older(
+    box: bpy.types.Scene, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    older = "Warning: The export is older than the lightmaps: export again"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    assert bake() == {"FINISHED"}
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert older not in capfd.readouterr().out
+    bpy.data.lights[0].energy *= 2.0
+    assert bpy.ops.radiosity.relight() == {"FINISHED"}
+    assert older in capfd.readouterr().out
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    box.radiosity.seed = 1
+    assert older not in capfd.readouterr().out
+    assert bake() == {"FINISHED"}
+    assert older in capfd.readouterr().out

@@ -18,6 +18,7 @@ from radiosity_addon.blender.files.files import open_scene
 from radiosity_addon.blender.operators.export_operators import export_folder, is_export_outdated
 from radiosity_addon.exports import Glb
 
+from . import group_bake
 from .hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
 
 
@@ -81,12 +82,37 @@ def test_an_export_of_other_lightmaps_is_outdated(baked: Path) -> None:
     assert is_export_outdated(bpy.context)
 
 
+def test_an_export_of_other_sliders_is_outdated(registered: None, tmp_path: Path) -> None:
+    group_bake.lit_plane()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    (tmp_path / "lightmaps").mkdir()
+    group_bake.bake_groups(folder=tmp_path / "lightmaps")
+    group_bake.slide("Lamps", 2.0, (1.0, 0.5, 0.25))
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert not is_export_outdated(bpy.context)
+    index = json.loads((export_folder(bpy.context) / "lightmaps.json").read_text(encoding="utf-8"))
+    factors = {group["name"]: group["factor"] for group in index["light_groups"]}
+    assert factors == {"Lamps": [2.0, 1.0, 0.5], "Glow": [1.0, 1.0, 1.0]}
+    group_bake.slide("Lamps", 1.0)
+    assert is_export_outdated(bpy.context)
+
+
 def test_nothing_is_exported_without_a_form_or_a_bake(baked: Path) -> None:
     bpy.context.scene.radiosity.export_web = False
     with pytest.raises(RuntimeError, match="form"):
         bpy.ops.radiosity.export()
     bpy.ops.radiosity.restore()
     assert not bpy.ops.radiosity.export.poll()
+
+
+def test_what_is_in_the_place_of_the_panels_export_is_an_error_message(baked: Path) -> None:
+    place = baked / "lightmaps" / "room_Scene_export"
+    place.write_text("mine")
+    before = contents()
+    with pytest.raises(RuntimeError, match="room_Scene_export"):
+        bpy.ops.radiosity.export()
+    assert place.read_text() == "mine"
+    assert contents() == before
 
 
 def test_blenders_own_exporter_names_lightmaps(baked: Path, enabled: None) -> None:

@@ -13,6 +13,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.jobs.inspection import ERROR, inspect
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.exporting import add_cube, add_instance, export_with, objects_by_name
@@ -75,15 +76,40 @@ def test_the_users_modes(registered: None) -> None:
     bpy.data.objects["Lighting"].radiosity_mode = "LIGHT_ONLY"
     bpy.data.objects["Gone"].radiosity_mode = "IGNORE"
     bpy.data.objects["Floor"].radiosity_texel_scale = 2.5
-    found = objects_by_name(export_with(sky=True))
+    bpy.data.objects["Floor"].radiosity_lightmap_page = 3
+    found = objects_by_name(export_with(sky=True, pages=3))
     assert {name: (item.bake, item.count) for name, item in found.items()} == {
         "Floor": (True, 12),
         "Lighting": (False, 12),
         "Gone": (False, 0),
     }
     assert found["Floor"].texel_scale == 2.5
+    assert found["Floor"].page == 3
     with pytest.raises(UsageError, match=r"'Lighting'.*ignored"):
         export_with(objects=("Lighting",))
+
+
+def test_an_object_on_a_page_that_there_is_not_is_refused(registered: None) -> None:
+    add_cube("Floor").radiosity_lightmap_page = 3
+    with pytest.raises(UsageError, match="'Floor' is to be on page 3, but the bake has 2 pages"):
+        export_with(sky=True, pages=2)
+    settings = BakeSettings(sky=True, pages=2)
+    errors = [each.message for each in inspect(bpy.context, settings, None).findings if each.level == ERROR]
+    assert any("page 3" in message for message in errors)
+    export_with(sky=True, atlas="per-object")
+    export_with(sky=True, texel_density=10.0)
+
+
+def test_an_instance_is_on_the_page_of_what_makes_it(registered: None) -> None:
+    collection = bpy.data.collections.new("Trees")
+    tree = add_cube("Tree")
+    bpy.context.scene.collection.objects.unlink(tree)
+    collection.objects.link(tree)
+    tree.radiosity_lightmap_page = 1
+    add_instance(collection, "First")
+    add_instance(collection, "Second").radiosity_lightmap_page = 2
+    found = objects_by_name(export_with(sky=True, pages=2))
+    assert sorted(item.page for item in found.values()) == [1, 2]
 
 
 def test_modes_on_the_command_line_win_and_unknown_names_are_refused() -> None:

@@ -103,9 +103,10 @@ def test_the_active_objects_choices_are_given_to_the_selected() -> None:
         obj.select_set(True)
     bpy.context.view_layer.objects.active = source
     source.radiosity_mode, source.radiosity_texel_scale = "LIGHT_ONLY", 3.0
-    one.radiosity_texel_scale = 0.5
+    source.radiosity_lightmap_page, one.radiosity_texel_scale = 2, 0.5
     assert bpy.ops.radiosity.copy_overrides() == {"FINISHED"}
     assert (one.radiosity_mode, one.radiosity_texel_scale) == ("LIGHT_ONLY", 3.0)
+    assert one.radiosity_lightmap_page == 2
     assert (other.radiosity_mode, other.radiosity_texel_scale) == ("BAKE", 1.0)
     assert not lamp.is_property_set("radiosity_mode")
     source.property_unset("radiosity_mode")

@@ -22,10 +22,13 @@ from radiosity_addon.blender.command_line.main import main
 from tests.browser.browser import ROOT, bundled, chromium, drawn, viewer
 from tests.browser.reference import inner_pixels, rendered
 from tests.browser.textured_room import build
+from tests.trees import build_trees
 
 pytestmark = pytest.mark.one_blender
 
-WIDTH, HEIGHT = 320, 240
+SIZE, SQUARE = (320, 240), (240, 240)
+"""Of pictures: the exported camera is that of the scene's own format, which is square in the Cornell box."""
+
 MAX_CONTRAST = 0.25
 """Between a pixel's neighbors, relative to their mean."""
 
@@ -41,6 +44,7 @@ class Exported:
     cycles_lightmap: np.ndarray
     inner: np.ndarray
     programs: dict[str, Path]
+    size: tuple[int, int] = SIZE
 
 
 @pytest.fixture(scope="module", params=["room", pytest.param("cornell", marks=pytest.mark.full)])
@@ -55,11 +59,31 @@ def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     radiosity_addon.register()
     assert main(["bake", *scene, "--output", str(folder / "out"), *DRAFT]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(folder / "out" / "baked.blend"))
-    inner = inner_pixels(WIDTH, HEIGHT)
-    images = [rendered(folder, WIDTH, HEIGHT, lightmap_only=only) for only in (False, True)]
+    size = SIZE if request.param == "room" else SQUARE
+    inner = inner_pixels(*size)
+    images = [rendered(folder, *size, lightmap_only=only) for only in (False, True)]
     programs = {name: bundled(f"{name}_page", folder) for name in ("three", "babylon")}
-    yield Exported(folder / "out" / "export", *images, inner, programs)
+    yield Exported(folder / "out" / "export", *images, inner, programs, size)
     radiosity_addon.unregister()
+
+
+@pytest.fixture(scope="module")
+def trees(tmp_path_factory: pytest.TempPathFactory) -> Exported:
+    """Nine trees that are one mesh, and what Cycles shows."""
+    chromium()
+    folder = tmp_path_factory.mktemp("trees")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    build_trees(9)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "trees.blend"))
+    radiosity_addon.register()
+    words = [str(folder / "trees.blend"), "--output", str(folder / "out"), "--pack", "rectangles"]
+    assert main(["bake", *words, *DRAFT]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "out" / "baked.blend"))
+    inner = inner_pixels(*SIZE)
+    images = [rendered(folder, *SIZE, lightmap_only=only) for only in (False, True)]
+    programs = {"three": bundled("three_page", folder)}
+    radiosity_addon.unregister()
+    return Exported(folder / "out" / "export", *images, inner, programs)
 
 
 def errors(found: np.ndarray, expected: np.ndarray, inner: np.ndarray) -> tuple[float, float]:
@@ -87,15 +111,26 @@ def errors(found: np.ndarray, expected: np.ndarray, inner: np.ndarray) -> tuple[
 def test_engines_show_what_cycles_shows(
     exported: Exported, engine: str, form: str, largest: float, median: float
 ) -> None:
-    pixels = drawn(exported.folder, exported.programs[engine], WIDTH, HEIGHT, form=form)
+    pixels = drawn(exported.folder, exported.programs[engine], *exported.size, form=form)
     found = errors(pixels, exported.cycles, exported.inner)
     assert found[0] < largest
     assert found[1] < median
 
 
+@pytest.mark.parametrize(("form", "largest"), [("exr", 0.003), ("ktx2", 0.006)])
+def test_instances_of_one_mesh_show_their_own_part_of_the_lightmap(
+    trees: Exported, form: str, largest: float
+) -> None:
+    index = json.loads((trees.folder / "lightmaps.json").read_text(encoding="utf-8"))
+    assert len({tuple(entry["offset"]) for entry in index["nodes"]}) == 10
+    pixels = drawn(trees.folder, trees.programs["three"], *trees.size, form=form)
+    found = errors(pixels, trees.cycles, trees.inner)
+    assert found[0] < largest
+
+
 @pytest.mark.full  # the same lightmap as with colors
 def test_the_lightmap_alone(exported: Exported) -> None:
-    pixels = drawn(exported.folder, exported.programs["three"], WIDTH, HEIGHT, form="exr", only="1")
+    pixels = drawn(exported.folder, exported.programs["three"], *exported.size, form="exr", only="1")
     white = pixels[..., 1] > 0.0
     found = errors(pixels, exported.cycles_lightmap, exported.inner & white & ~_leaves(exported))
     assert found[0] < 0.003
@@ -105,10 +140,19 @@ def test_the_lightmap_alone(exported: Exported) -> None:
 def _leaves(exported: Exported) -> np.ndarray:
     """Return where cut-outs are: their page shows their color, which is in the image of their alpha."""
     color = exported.cycles[..., :3] / np.maximum(exported.cycles_lightmap[..., :3], 1e-6)
-    return (color[..., 1] > 0.6) & (color[..., 2] < 0.3)
+    return color[..., 1] > 3.0 * color[..., [0, 2]].max(axis=-1)  # they alone are green
 
 
 def test_the_validator_finds_no_error(exported: Exported) -> None:
+    check_validity(exported.folder)
+
+
+def test_the_validator_finds_no_error_in_shared_meshes(trees: Exported) -> None:
+    check_validity(trees.folder)
+
+
+def check_validity(folder: Path) -> None:
+    """Have Khronos' validator look at both files of an export."""
     program = (
         "const v=require('gltf-validator'),fs=require('fs'),{dirname,join}=require('path');"
         "const read=(f)=>new Uint8Array(fs.readFileSync(f));"
@@ -116,7 +160,7 @@ def test_the_validator_finds_no_error(exported: Exported) -> None:
         "Promise.all(process.argv.slice(1).map(f=>v.validateBytes(read(f),next(f))))"
         ".then(r=>console.log(JSON.stringify(r.map(x=>x.issues))))"
     )
-    files = [str(exported.folder / name) for name in ("scene.glb", "scene_baked.glb")]
+    files = [str(folder / name) for name in ("scene.glb", "scene_baked.glb")]
     environment = {
         "NODE_PATH": str(viewer_bundle.node_packages(ROOT)),
         "PATH": "/usr/local/bin:/usr/bin:/bin",
@@ -160,6 +204,23 @@ def test_the_viewer_mixes_light_groups_and_measures_light(tmp_path: Path) -> Non
         text = shown.evaluated("document.getElementById('lux').textContent")
         assert "lx" in text
         assert "Wall" in text
+
+
+def test_surfaces_that_glow_follow_their_light_group(tmp_path: Path) -> None:
+    chromium()
+    build(tmp_path / "room.blend")
+    radiosity_addon.register()
+    words = ["bake", str(tmp_path / "room.blend"), "--output", str(tmp_path / "out"), *DRAFT[2:]]
+    assert main([*words, "--resolution", "32", "--light-group", "Day=Panel"]) == 0
+    radiosity_addon.unregister()
+    find = "[...viewer.shiny.materials.values()].find(m => m.userData.lightmap.light_group)"
+    with viewer(tmp_path / "out" / "export" / "viewer.html", 300, 300) as shown:
+        assert shown.evaluated(f"{find}.userData.lightmap.light_group") == "Day"
+        before = shown.evaluated(f"{find}.emissive.toArray()")
+        assert min(before) > 0
+        shown.evaluated("viewer.shiny.mix({ Day: [2, 0.5, 0] }); viewer.draw()")
+        after = shown.evaluated(f"{find}.emissive.toArray()")
+        np.testing.assert_allclose(after, np.array(before) * (2, 0.5, 0), rtol=1e-6)
 
 
 def test_the_bundled_program_is_of_its_sources(tmp_path: Path) -> None:

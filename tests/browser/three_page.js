@@ -15,7 +15,11 @@ async function exact(lit) {
     const texture = await new EXRLoader().setDataType(FloatType).loadAsync(`/export/${lit.index.pages[page].exr}`);
     Object.assign(texture, { flipY: true, needsUpdate: true, channel: 1, minFilter: LinearFilter, magFilter: LinearFilter });
     for (const material of lit.materials.values()) {
-      if (material.userData.lightmap.page === page) material.lightMap = texture;
+      if (material.userData.lightmap.page !== page) continue;
+      const { repeat, offset } = material.lightMap;
+      material.lightMap = texture.clone();
+      material.lightMap.repeat.copy(repeat);
+      material.lightMap.offset.copy(offset);
     }
   }
 }

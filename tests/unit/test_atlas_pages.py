@@ -54,6 +54,33 @@ def test_a_density_that_needs_more_than_the_largest_page_makes_more_pages():
         run_atlas(objects, texel_density=50, limits=Limits(largest=64))
 
 
+@pytest.mark.parametrize("density", [None, 40.0])
+def test_objects_are_on_the_pages_they_name(density):
+    wanted = (2, 0, 3, 2, 0, 1, 0)
+    objects = [AtlasInput(f"box {k}", *box((1, 1, 1)), page=page) for k, page in enumerate(wanted)]
+    atlas = run_atlas(objects, 256, density, pages=3)
+    assert len(atlas.pages) == 3
+    for laid, page in zip(atlas.objects, wanted, strict=True):
+        assert page in (0, laid.page + 1)
+    assert np.bincount([laid.page for laid in atlas.objects]).tolist() == [3, 2, 2]
+
+
+def test_pages_without_objects_are_left_out():
+    objects = [AtlasInput(f"box {page}", *box((1, 1, 1)), page=page) for page in (4, 2)]
+    assert [laid.page for laid in run_atlas(objects, 64, pages=4).objects] == [1, 0]
+
+
+def test_what_does_not_fit_on_the_page_it_names_is_an_error():
+    limits = Limits(largest=256)
+    objects = [AtlasInput(f"box {k}", *box((1, 1, 1)), page=min(k, 1)) for k in range(9)]
+    with pytest.raises(BakeError, match="lower the density"):
+        run_atlas(objects, texel_density=50, limits=limits)
+    free = [replace(each, page=int(k < 2)) for k, each in enumerate(objects)]
+    atlas = run_atlas(free, texel_density=50, limits=limits)
+    assert [laid.page for laid in atlas.objects[:2]] == [0, 0]
+    assert max(np.bincount([laid.page for laid in atlas.objects])) == 2
+
+
 @pytest.mark.parametrize("mip_levels", [0, 1, 2, 3])
 def test_down_to_the_mip_level_requested_no_texel_shows_two_charts(mip_levels):
     """Bilinear filtering at level L reads whole texels of that level; one may hold one chart only."""

@@ -110,7 +110,7 @@ def test_a_hidden_face_far_off_does_not_darken_what_lies_close_before_a_large_on
 
 
 def test_around_a_bulb_no_ray_is_blocked_by_the_bulb() -> None:
-    """Its inside shines as well, and faces every point from across: together half of all rays would be blocked."""
+    """Its inside shines as well, and faces each point from across: half of all rays would be blocked."""
     bulb = sphere(2)[:, [0, 2, 1]] * 0.1
     scene = gray_scene(bulb, 0.5, np.ones((len(bulb), 3)), two_sided=np.ones(len(bulb), dtype=bool))
     caster = EmbreeCaster(bulb)
@@ -127,7 +127,7 @@ def test_around_a_bulb_no_ray_is_blocked_by_the_bulb() -> None:
 
 
 def test_a_footprint_that_a_panel_cuts_gets_all_light_of_its_sides() -> None:
-    """A post stands in a shining panel: what is above it sees its upper side alone, what is below the lower."""
+    """A post stands in a shining panel: above it one sees its upper side alone, below it the lower."""
     panel = rectangle((-1, -1, 0), (0, 2, 0), (2, 0, 0))
     scene = gray_scene(panel, 0.5, np.ones((2, 3)), two_sided=np.ones(2, dtype=bool))
     caster = EmbreeCaster(panel)

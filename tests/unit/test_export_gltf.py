@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -127,6 +128,15 @@ def test_materials_name_their_lightmap_and_keep_their_shine() -> None:
     assert material["name"] == "Bark"
     assert [node["name"] for node in glb.json["nodes"]] == ["Tree", "Tree.001", "lamp"]
     assert glb.json["extensionsUsed"] == ["MOZ_lightmap"]
+
+
+def test_materials_name_the_light_group_of_their_emission() -> None:
+    (own,) = {*NAMES.materials}
+    names = replace(NAMES, light_groups={own: "Evening"})
+    glb = read_back(with_lightmaps(written(), names, {0: "lightmap.ktx2"}, lamps=False))
+    assert glb.json["materials"][0]["extras"]["lightmap"]["light_group"] == "Evening"
+    glb = read_back(with_lightmaps(written(), NAMES, {0: "lightmap.ktx2"}, lamps=False))
+    assert "light_group" not in glb.json["materials"][0]["extras"]["lightmap"]
 
 
 def test_nothing_of_ours_stays_in_extras_but_the_lightmap() -> None:

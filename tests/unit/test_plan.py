@@ -52,6 +52,7 @@ DIFFERENT = {
     "no shadow": (lambda: with_arrays(in_shadows=np.logical_not), {Part.ROLE}),
     "not baked": (lambda: with_box(bake=False), {Part.ROLE}),
     "sharper": (lambda: with_box(texel_scale=2.0), {Part.MESH}),
+    "on page 2": (lambda: with_box(page=2), {Part.MESH}),
     "strengths": (lambda: lit_bake(CHANGED), {Part.STRENGTH, Part.EMISSION}),
     "lamp gone": (lambda: with_lights(*LIGHTS[1:]), {Part.LIGHT_REMOVED, Part.LIGHT_ORDER}),
     "lamps swapped": (lambda: with_lights(LIGHTS[1], LIGHTS[0], *LIGHTS[2:]), {Part.LIGHT_ORDER}),

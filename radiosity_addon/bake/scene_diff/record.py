@@ -96,6 +96,7 @@ def rounded_digest(bake_scene: BakeScene, item: BakeObject) -> str:
     """Return a digest of an object's place, role, surface and texel scale, each rounded."""
     scene, rows = bake_scene.scene, item.rows
     digest = hashlib.sha256(f"{item.texel_scale:.6g}".encode())
+    digest.update(f"page {item.page}".encode() if item.page else b"")
     shape = (scene.triangles[rows], scene.normals[rows])
     for values in (*shape, scene.reflectance[rows] / DIGEST_STEP, scene.opacity[rows] / DIGEST_STEP):
         digest.update(np.round(values, 4 if values.ndim == 3 else 0).astype(np.float32).tobytes())
@@ -136,8 +137,9 @@ def _record_of(bake_scene: BakeScene, item: BakeObject, laid_out: Array | None) 
     emits = scene.emission[rows].any(axis=1)
     emitter = () if bake_scene.emitter is None or not emits.any() else (bake_scene.emitter[rows][emits],)
     triangle = np.arange(item.first, item.first + item.count)
+    page = (np.array(item.page),) if item.page else ()
     return ObjectRecord(
-        mesh=_digest(item.polygon, item.loops, scene.areas[rows] > 0, np.array(item.texel_scale)),
+        mesh=_digest(item.polygon, item.loops, scene.areas[rows] > 0, np.array(item.texel_scale), *page),
         role=_digest(
             np.array(item.bake), scene.two_sided[rows], scene.in_bounces[rows], scene.in_shadows[rows]
         ),

@@ -16,7 +16,6 @@ from ...files import (
     OWNER,
     REPORT_NAME,
     NoReportError,
-    Owner,
     images_described,
     is_as_written,
     lightmap_digests,
@@ -25,7 +24,7 @@ from ...files import (
 from ...options import Form
 from ..exporting.export import run_export
 from ..files.files import open_scene
-from ..files.output import OutputFolder
+from .export_places import output_of_export
 from .verbs import registered, run_through
 
 
@@ -39,6 +38,7 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
     """
     folder = folder.expanduser().resolve()
     report = _report_of(folder)
+    edited = not is_as_written(folder / BLEND_NAME, report[LISTED][BLEND_NAME])
     with registered():
         console.progress("open", 0.0)
         open_scene(folder / BLEND_NAME, allowed.scripts)
@@ -47,16 +47,19 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
             raise SceneError(f"'{folder / BLEND_NAME}' has no scene '{report[OWNER]['scene']}': bake again")
         if bpy.context.window is not None:
             bpy.context.window.scene = scene
-        owner = Owner(str(folder / BLEND_NAME), scene.name)
-        output = OutputFolder(folder / EXPORT_FOLDER, overwrite=allowed.overwrite, owner=owner)
+        output = output_of_export(folder, scene.name, allowed)
         digests = lightmap_digests(report)
         made = run_through(run_export(bpy.context, form, output, digests), console, interrupts)
         lines = [f"exported into {folder / EXPORT_FOLDER}", *(f"  {name}" for name in made.files)]
-        console.lines([*lines, *(f"note: {note}" for note in made.notes)])
+        notes = [f"{BLEND_NAME} was changed since it was baked: it is exported as it is"] if edited else []
+        console.lines([*lines, *(f"note: {note}" for note in (*notes, *made.notes))])
 
 
 def _report_of(folder: Path) -> dict[str, Any]:
-    """Return the report of the bake in a folder whose files are as the bake wrote them."""
+    """Return the report of the bake in a folder whose lightmaps are as the bake wrote them.
+
+    The .blend may have been changed: sliders of light groups are in it.
+    """
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder: give the one that was baked into")
     path = folder / REPORT_NAME
@@ -72,6 +75,6 @@ def _report_of(folder: Path) -> dict[str, Any]:
         file = folder / name
         if not file.is_file():
             raise SceneError(f"'{file}' is missing: put it back, or bake again")
-        if name in report[LISTED] and not is_as_written(file, report[LISTED][name]):
+        if name in report[LISTED] and name != BLEND_NAME and not is_as_written(file, report[LISTED][name]):
             raise SceneError(f"'{file}' was changed since it was baked: bake again")
     return report

@@ -58,8 +58,14 @@ def main(
             check_plot(request.plot)
             check_keeping(request, settings)
         wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
-        form = None if wanted is None else forms_of(wanted)
-        if settings is not None and form is not None and settings.padding is None and not settings.mip_levels:
+        form = None if wanted is None else forms_of(wanted, request.sum_groups)
+        if (
+            settings is not None
+            and form is not None
+            and not request.relight
+            and settings.padding is None
+            and not settings.mip_levels
+        ):
             settings = replace(settings, padding=ENGINE_PADDING)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
@@ -103,6 +109,7 @@ def _run(
                     console,
                     interrupts,
                     preview=not request.no_preview,
+                    form=form,
                 )
             elif settings is not None:
                 verbs.bake(
@@ -117,6 +124,7 @@ def _run(
                     console,
                     interrupts,
                     preview=not request.no_preview,
+                    form=form,
                 )
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)

@@ -7,9 +7,9 @@ from pathlib import Path
 from ...cli import Console
 from ...files import (
     EXPORT_FOLDER,
-    FORMS,
     REPORT_NAME,
     NoReportError,
+    forms_in,
     is_outdated,
     lightmap_digests,
     read_report,
@@ -23,7 +23,7 @@ def warn_of_outdated(folder: Path, console: Console) -> None:
         digests = lightmap_digests(read_report(folder / REPORT_NAME))
     except (OSError, NoReportError):
         return
-    if is_outdated(exported, digests):
-        command = f"export {folder} --forms {','.join(exported[FORMS])}"
+    if is_outdated(exported, folder / EXPORT_FOLDER, digests):
+        command = f"export {folder} --forms {','.join(forms_in(exported))}"
         place = folder / EXPORT_FOLDER
         console.lines([f"warning: the export in {place} is older than the lightmaps: run {command}"])

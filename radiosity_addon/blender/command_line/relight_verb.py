@@ -15,7 +15,7 @@ from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
-from ...options import OPTIONS, BakeSettings
+from ...options import OPTIONS, BakeSettings, Form
 from ..apply.rebake import Originals
 from ..files.output import OutputFolder
 from ..files.single_files import check_places
@@ -24,6 +24,7 @@ from ..jobs.finish import Copies, finish
 from ..jobs.preview import QUICK_SAMPLES
 from ..relight.relight_scene import lit
 from ..scene_export.export import export_steps
+from .export_places import check_export
 from .verbs import open_or_build, output_of, registered, run_through, same_file, written_files
 
 EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
@@ -41,12 +42,13 @@ def relight(
     interrupts: Interrupts,
     *,
     preview: bool = True,
+    form: Form | None = None,
 ) -> None:
     """Relight the bake in a folder with the present lights of the scene that was baked.
 
     Parameters
     ----------
-    scene, loaded, report_copy, allowed, console, interrupts, preview
+    scene, loaded, report_copy, allowed, console, interrupts, preview, form
         As for `verbs.bake`.
     output : Path
         The folder with the bake and its sidecar.
@@ -76,6 +78,8 @@ def relight(
             )
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
+        if form is not None:
+            check_export(output, form, stored.settings.quantity, allowed)
         job = relight_into(bpy.context, stored, folder, notes, preview)
         report = run_through(job, console, interrupts)
         if report_copy is not None:

@@ -14,7 +14,7 @@ from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
-from ...options import BakeSettings
+from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
 from ..files.cornell import build_cornell_box
 from ..files.files import empty_scene, open_scene
@@ -29,6 +29,7 @@ from ..operators.checks import figures
 from ..registration import register, unregister
 from ..relight import kept_bakes
 from ..session import last_bake
+from .export_places import check_export
 
 T = TypeVar("T")
 
@@ -49,6 +50,7 @@ def bake(
     interrupts: Interrupts,
     *,
     preview: bool = True,
+    form: Form | None = None,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -72,6 +74,8 @@ def bake(
     interrupts : Interrupts
     preview : bool
         Whether a picture of the result is rendered.
+    form : Form or None
+        What is exported afterwards: its files are checked before the bake starts.
     """
     with registered():
         source = scene or loaded
@@ -81,6 +85,8 @@ def bake(
         console.progress("open", 0.0)
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy, plot)
+        if form is not None:
+            check_export(output, form, settings.quantity, allowed)
         keeping = KeepOptions(sidecar=True) if keep else None
         job = run_bake(
             bpy.context,

@@ -5,6 +5,8 @@ The verb `export`, the option `--export` and the button *Export* all run this.
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -20,19 +22,21 @@ from ...exports import (
     Glb,
     GroupEntry,
     LightmapIndex,
+    LightmapPlace,
     NodeEntry,
     PageEntry,
     emissive_only,
     lightmap_index,
     png_of_linear,
     resampled,
+    share_meshes,
     static_files,
     viewer_page,
     with_lightmaps,
     write_half_exr,
     write_ktx2,
 )
-from ...files import FORMS, LIGHTMAPS_OF, PLAIN_NAMES, unique_names
+from ...files import PLAIN_NAMES, export_record, older_files, unique_names
 from ...numerics import Array
 from ...options import EFFICACY, ENGINE_PADDING, Form
 from ..datablocks.quiet_output import silenced
@@ -55,6 +59,13 @@ class ExportReport:
     notes: tuple[str, ...] = ()
 
 
+def foreseen_files(form: Form) -> list[str]:
+    """Return the names of the files that an export writes in any case."""
+    fixed = [LIT, INDEX_NAME, *([BAKED] if form.lit_scene else []), *([VIEWER] if form.viewer else [])]
+    (stem,) = PLAIN_NAMES.shared_pages(1)
+    return [*fixed, *static_files(form), f"{stem}.exr", f"{stem}.ktx2"]
+
+
 def run_export(
     context: bpy.types.Context, form: Form, folder: OutputFolder, lightmaps: Mapping[str, str]
 ) -> Generator[Status, None, ExportReport]:
@@ -68,26 +79,26 @@ def run_export(
         If the scene shows no lightmap that can be exported, or a file cannot be written.
     """
     with folder as output:
+        output.expect(foreseen_files(form))
         files = static_files(form)
-        fixed = [LIT, INDEX_NAME, *([BAKED] if form.lit_scene else []), *([VIEWER] if form.viewer else [])]
-        output.expect([*fixed, *files])
         yield Status("export", 0.0)
         with closing(export_scene(context)) as scene:
-            light = _Lightmaps.of(scene)
+            light = _Lightmaps.of(scene, sum_groups=form.sum_groups)
             output.expect(light.file_names)
             yield Status("colors", 0.1)
             colors = _evaluated(context, scene, light, every=form.lit_scene)
             yield Status("glTF", 0.4)
             _show_images(scene, colors)
             written = _gltf(context, scene, output.staging, keeps_lamps=light.keeps_lamps)
+            shared, places = share_meshes(written, scene.names, scene.baked, light.sizes)
             lit = with_lightmaps(
-                written, scene.names, dict(enumerate(light.ktx2_names)), lamps=light.keeps_lamps
+                shared, scene.names, dict(enumerate(light.ktx2_names)), lamps=light.keeps_lamps
             )
             files[LIT] = lit.to_bytes()
             yield Status("lightmaps", 0.6)
             images = light.files()
             files |= images
-            files[INDEX_NAME] = lightmap_index(light.index(scene)).encode()
+            files[INDEX_NAME] = lightmap_index(light.index(scene, places)).encode()
             if form.lit_scene:
                 yield Status("baked glTF", 0.8)
                 pages = _light_pages(scene, light, colors)
@@ -101,33 +112,42 @@ def run_export(
             path = output.staging / name
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(data)
-        report = {"version": REPORT_VERSION, FORMS: list(form.names), LIGHTMAPS_OF: dict(lightmaps)}
-        output.write_report(BakeReport(report))
+        left = {BAKED, VIEWER} - files.keys()
+        record = export_record(output.earlier, form.names, lightmaps, light.mix, left)
+        output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
         output.publish()
-    return ExportReport(tuple(sorted(files)), tuple(light.notes))
+        older = [f"{name} is of earlier lightmaps" for name in older_files(record, output.path)]
+    return ExportReport(tuple(sorted(files)), (*light.notes, *older))
 
 
 @dataclass(frozen=True, eq=False)
 class _Lightmaps:
-    """The pages of an export as arrays, and the names of their files."""
+    """The pages of an export as arrays, and the names of their files.
+
+    groups: Light groups that have lightmaps of their own, with their factors.
+    mix: The factors of all light groups.
+    """
 
     light: str
     pages: tuple[Array, ...]
     groups: tuple[tuple[str, tuple[float, float, float], tuple[Array, ...]], ...]
+    mix: dict[str, tuple[float, float, float]]
     stems: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, scene: ExportScene) -> _Lightmaps:
+    def of(cls, scene: ExportScene, *, sum_groups: bool) -> _Lightmaps:
         shown = scene.shown
         pages = tuple(shown.page(number) for number in range(len(shown.images)))
         groups = tuple(
-            (group.name, group.factor, tuple(map(light_of, group.images))) for group in shown.groups
+            (group.name, group.factor, tuple(map(light_of, group.images)))
+            for group in (() if sum_groups else shown.groups)
         )
+        mix = {group.name: group.factor for group in shown.groups}
         taken: set[str] = set()
         names = [PLAIN_NAMES.shared_pages(len(pages), group) for group in ("", *(each[0] for each in groups))]
         stems = tuple(tuple(unique_names(of, "", taken)) for of in names)
-        notes = []
+        notes = list(dict.fromkeys(note for material in scene.materials for note in material.notes))
         if shown.light == "indirect":
             notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
         uneven = [
@@ -140,7 +160,7 @@ class _Lightmaps:
                 f"charts are {shown.padding} texels apart, enough for bilinear filters: for bicubic ones and "
                 f"compressed textures bake with a padding of {ENGINE_PADDING}"
             )
-        return cls(shown.light, pages, groups, stems, tuple(notes))
+        return cls(shown.light, pages, groups, mix, stems, tuple(notes))
 
     @property
     def keeps_lamps(self) -> bool:
@@ -155,6 +175,11 @@ class _Lightmaps:
     def file_names(self) -> list[str]:
         return [f"{stem}{ending}" for of in self.stems for stem in of for ending in (".exr", ".ktx2")]
 
+    @property
+    def sizes(self) -> dict[int, tuple[int, int]]:
+        """Width and height of each page."""
+        return {number: (page.shape[1], page.shape[0]) for number, page in enumerate(self.pages)}
+
     def files(self) -> dict[str, bytes]:
         """Return the files of all pages."""
         found = {}
@@ -163,8 +188,11 @@ class _Lightmaps:
                 found[f"{stem}.exr"], found[f"{stem}.ktx2"] = write_half_exr(page), write_ktx2(page)
         return found
 
-    def index(self, scene: ExportScene) -> LightmapIndex:
-        """Return what lightmaps.json says."""
+    def index(self, scene: ExportScene, places: Mapping[str, LightmapPlace]) -> LightmapIndex:
+        """Return what lightmaps.json says.
+
+        places: Of objects that share a mesh.
+        """
         entries = [
             tuple(_entry(page, stem) for page, stem in zip(pages, stems, strict=True))
             for stems, pages in zip(self.stems, (self.pages, *(each[2] for each in self.groups)), strict=True)
@@ -173,7 +201,10 @@ class _Lightmaps:
             GroupEntry(name, factor, of)
             for (name, factor, _), of in zip(self.groups, entries[1:], strict=True)
         ]
-        nodes = [NodeEntry(name, page) for name, page in scene.baked.items()]
+        nodes = []
+        for name, page in scene.baked.items():
+            place = places.get(name, LightmapPlace((1.0, 1.0), (0.0, 0.0)))
+            nodes.append(NodeEntry(name, page, scale=place.scale, offset=place.offset))
         lamps = [] if self.keeps_lamps else lamps_in(scene.objects)
         return LightmapIndex(self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes)
 
@@ -198,7 +229,7 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
         sizes.append((factor * width, factor * height))
     if not needed:
         return {}
-    with bake_units(context, scene) as objects:
+    with bake_units(scene) as objects:
         return {
             channel: evaluate_channel(context, scene, objects, sizes, channel)
             for channel in CHANNELS
@@ -208,7 +239,7 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
 
 def evaluated_materials(context: bpy.types.Context, scene: ExportScene) -> None:
     """Have the temporary scene's materials read images of what glTF cannot express of them."""
-    _show_images(scene, _evaluated(context, scene, _Lightmaps.of(scene), every=False))
+    _show_images(scene, _evaluated(context, scene, _Lightmaps.of(scene, sum_groups=True), every=False))
 
 
 def _show_images(scene: ExportScene, colors: _Colors) -> None:
@@ -250,11 +281,20 @@ def _gltf(context: bpy.types.Context, scene: ExportScene, folder: Path, *, keeps
                 export_import_convert_lighting_mode="SPEC",
             )
         written = path.read_bytes()
-    except (RuntimeError, OSError) as error:
-        raise BakeError(f"Blender could not write the glTF file: {' '.join(str(error).split())}") from error
+    except RuntimeError as error:
+        raise _failure(str(error), folder / LIT) from error
     finally:
         path.unlink(missing_ok=True)
     return Glb.of_bytes(written)
+
+
+def _failure(message: str, path: Path) -> OSError | BakeError:
+    """Return what Blender's exporter failed of: its message is a traceback."""
+    system = re.search(r"\[Errno (\d+)\]", message)
+    if system is not None:
+        return OSError(int(system[1]), os.strerror(int(system[1])), str(path))
+    said = re.findall(r"^\s*(\w+(?:Error|Exception)\b.*)$", message, re.MULTILINE)
+    return BakeError(f"Blender's glTF exporter failed: {' '.join((said or [message])[-1].split())}")
 
 
 @contextmanager

@@ -36,6 +36,7 @@ class ExportMaterial:
     evaluated: The channels whose source glTF cannot express.
     glows: Whether it emits.
     factor: What its emission is multiplied by: that of its light group.
+    notes: Which of its images are missing.
     is_cut_out: Whether its evaluated alpha is hardly anywhere between 0 and 1.
     """
 
@@ -47,6 +48,7 @@ class ExportMaterial:
     evaluated: set[str]
     glows: bool
     factor: tuple[float, float, float]
+    notes: tuple[str, ...] = ()
     is_cut_out: bool = False
 
     @property
@@ -100,6 +102,8 @@ def export_material(
     if not has_uvs:
         pin_uvs(tree)
     output = output_node(tree) or tree.nodes.new("ShaderNodeOutputMaterial")
+    shown_as = original.name if original else "No Material"
+    notes = tuple(f"material '{shown_as}': {missing}" for missing in _unlink_missing(tree))
     surface = read_surface(tree, output.inputs["Surface"], unknown)
     principled = feed_of(output.inputs["Surface"], enter_groups=False).node
     keeps_shine = principled is not None and principled.type == "BSDF_PRINCIPLED"
@@ -127,13 +131,14 @@ def export_material(
         _scale_emission(principled, factor)
     return ExportMaterial(
         made,
-        original.name if original else "No Material",
+        shown_as,
         page,
         principled,
         sources,
         evaluated,
         glows,
         factor,
+        notes,
     )
 
 
@@ -177,6 +182,28 @@ def _constant(source: Any, channel: str) -> tuple[float, ...] | None:
         return _constant_input(probe.inputs["Color"])
     finally:
         probe.id_data.nodes.remove(probe)
+
+
+def _unlink_missing(tree: bpy.types.NodeTree) -> list[str]:
+    """Let inputs of shaders that come from images without pixels have their defaults, as in the bake.
+
+    Returns which they are.
+    """
+    found = []
+    shaders = [node for node in tree.nodes if any(output.type == "SHADER" for output in node.outputs)]
+    for socket in [each for node in shaders for each in node.inputs if each.is_linked]:
+        if socket.type not in {"RGBA", "VALUE"}:
+            continue
+        try:
+            with known_means_only(None):
+                evaluate(socket)
+        except MissingImageError as reason:
+            found.append(f"{socket.name} comes from {reason}; its default is exported")
+            for link in list(socket.links):
+                tree.links.remove(link)
+        except NotConstantError:
+            pass
+    return found
 
 
 def _constant_input(socket: bpy.types.NodeSocket) -> tuple[float, ...] | None:

@@ -112,6 +112,7 @@ class _Copies:
         self._nodes: dict[str, str] = {}
         self._meshes: dict[str, str] = {}
         self._materials: dict[tuple[str, bool], ExportMaterial] = {}
+        self._groups: dict[str, str] = {}
 
     def add(self, objects: Sequence[bpy.types.Object]) -> None:
         """Copy objects, and put the copies below each other as they are."""
@@ -146,6 +147,8 @@ class _Copies:
             self._meshes,
             {each.material.name: (each.name, each.page) for each in made.materials},
             [each.material.name for each in made.materials if each.glows],
+            [each.material.name for each in made.materials if each.evaluated],
+            self._groups,
         )
 
     def _page(self, material: bpy.types.Material | None) -> int | None:
@@ -175,12 +178,15 @@ class _Copies:
         if key not in self._materials:
             shown = self._made.shown
             name = f"{PREFIX}material_{len(self._materials)}"
-            factor = shown.factor_of(group_of_emission(material))
+            group = group_of_emission(material)
+            factor = shown.factor_of(group)
             before = set(bpy.data.node_groups)
             self._materials[key] = made = export_material(
                 material, name, shown.page_of[material.name], has_uvs, factor
             )
             self._made.made += [*(set(bpy.data.node_groups) - before), made.material]
+            if made.glows and group:
+                self._groups[made.material.name] = group
         return self._materials[key]
 
 

@@ -77,11 +77,7 @@ def shown_lightmaps(objects: Sequence[bpy.types.Object]) -> ShownLightmaps:
     if not images:
         raise SceneError("the scene shows no lightmap: bake it first")
     quantity = images[0].get(QUANTITY_PROPERTY, "irradiance_over_pi")
-    if quantity not in PER_TEXEL:
-        raise SceneError(
-            f"the lightmap holds {quantity}, which engines cannot multiply with a color: "
-            "bake with the quantity irradiance_over_pi"
-        )
+    refuse_quantity(quantity)
     page_of = {copy.name: images.index(found[0]) for copy, found in nodes.items() if found}
     by_page = {images.index(found[0]): found[1:] for found in nodes.values() if found}
     groups = [
@@ -90,6 +86,15 @@ def shown_lightmaps(objects: Sequence[bpy.types.Object]) -> ShownLightmaps:
     ]
     light = str(images[0].get(LIGHT_PROPERTY, "all"))
     return ShownLightmaps(tuple(images), tuple(groups), page_of, light, images[0].get(PADDING_PROPERTY))
+
+
+def refuse_quantity(quantity: str) -> None:
+    """Raise SceneError for a quantity that engines cannot use."""
+    if quantity not in PER_TEXEL:
+        raise SceneError(
+            f"the lightmap holds {quantity}, which engines cannot multiply with a color: "
+            "bake with the quantity irradiance_over_pi"
+        )
 
 
 def light_of(image: bpy.types.Image) -> Array:

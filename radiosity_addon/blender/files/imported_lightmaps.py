@@ -57,6 +57,33 @@ class LightmapImport:
         if image is not None:
             show_lightmap(material, image)
 
+    def gather_import_node_after_hook(
+        self, _vnode: Any, gltf_node: Any, obj: bpy.types.Object | None, _gltf: Any
+    ) -> None:
+        """Put the UVs of an instance where its place on the page is, in a mesh of its own."""
+        told = (getattr(gltf_node, "extras", None) or {}).get("lightmap")
+        if _suspended or obj is None or obj.type != "MESH" or not isinstance(told, dict):
+            return
+        try:
+            scale, offset = (np.array(told[key], dtype=np.float64).reshape(2) for key in ("scale", "offset"))
+        except (KeyError, TypeError, ValueError):
+            return
+        if SECOND_LAYER in obj.data.uv_layers:
+            obj.data = obj.data.copy()
+            _move_uvs(obj.data, scale, offset)
+        if "lightmap" in obj:
+            del obj["lightmap"]
+
+
+def _move_uvs(mesh: bpy.types.Mesh, scale: np.ndarray, offset: np.ndarray) -> None:
+    """Scale and move UVs as KHR_texture_transform does, whose v points down."""
+    # Written through the UV layer, they would also change in the mesh that this is a copy of (Blender 5.0).
+    uvs = mesh.attributes[SECOND_LAYER].data
+    uv = np.empty(2 * len(uvs), dtype=np.float32)
+    uvs.foreach_get("vector", uv)
+    place = (offset[0], 1.0 - offset[1] - scale[1])
+    uvs.foreach_set("vector", (uv.reshape(-1, 2) * scale + place).astype(np.float32).ravel())
+
 
 def _image(path: Path) -> bpy.types.Image | None:
     """Return a lightmap as an image that is packed into the file; None if it is no KTX2 of ours."""

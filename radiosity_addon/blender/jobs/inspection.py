@@ -36,7 +36,7 @@ from ..cycles.surface_evaluation import foreseen_bytes
 from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
-from ..scene_export.export import all_glass, check_names, chosen_pieces
+from ..scene_export.export import all_glass, check_names, check_pages, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
@@ -143,6 +143,7 @@ def inspect(
     try:
         check_names(context, collected.pieces, settings)
         chosen = chosen_pieces(context, collected.pieces, settings.objects)
+        check_pages(chosen, settings)
     except RadiosityError as error:
         chosen = []
         findings.append(Finding(ERROR, context.scene.name, str(error)))

@@ -92,4 +92,5 @@ def _lit_object(
         piece.role.texel_scale,
         box,
         keeps_uvs=keep_uvs and piece.has_lightmap_layer,
+        page=piece.role.page,
     )

@@ -20,6 +20,7 @@ from ..settings.preferences import output_folder
 from ..settings.properties import settings_of
 from .checks import look_first
 from .cleaning import look_for_interrupted
+from .export_operators import warn_of_outdated
 from .polls import Conditional, has_folder, has_scene, no_bake_runs
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
         if len(warnings) > 3:
             self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
+        warn_of_outdated(self, context)
 
 
 class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ...base import BakeError, RadiosityError
-from ...files import FileNames, NoReportError, is_outdated, read_report
+from ...files import FileNames, Mix, NoReportError, is_outdated, read_report
 from ...options import EXPORT_FORMS, Form
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import PAGE, VERSION
@@ -29,7 +29,7 @@ def chosen_forms(context: bpy.types.Context) -> Form:
     """Return the forms that the panel's check boxes choose."""
     settings = context.scene.radiosity
     names = [choice.value for choice in EXPORT_FORMS if getattr(settings, f"export_{choice.value}")]
-    return Form(tuple(names))
+    return Form(tuple(names), settings.sum_groups)
 
 
 def export_folder(context: bpy.types.Context) -> Path | None:
@@ -44,9 +44,26 @@ def shown_versions() -> dict[str, str]:
     return {image.name: str(image.get(VERSION, "")) for image in own if image.get(PAGE) is not None}
 
 
+def shown_mix(context: bpy.types.Context) -> Mix | None:
+    """Return what light groups are multiplied by; None where nothing is shown that could be exported."""
+    from ..exporting.export_scene import rendered_objects
+    from ..exporting.shown_lightmaps import shown_lightmaps
+
+    shown = [obj for obj in rendered_objects(context.view_layer) if obj.type == "MESH"]
+    try:
+        return {group.name: group.factor for group in shown_lightmaps(shown).groups}
+    except RadiosityError:
+        return None
+
+
 @fact(unknown=False)
 def is_export_outdated(context: bpy.types.Context) -> bool:
     """Whether the scene's export is of other lightmaps than those that are shown."""
+    return outdated_now(context)
+
+
+def outdated_now(context: bpy.types.Context) -> bool:
+    """Return whether the scene's export is of other lightmaps than those shown, or mixes them otherwise."""
     folder = export_folder(context)
     if folder is None:
         return False
@@ -54,7 +71,13 @@ def is_export_outdated(context: bpy.types.Context) -> bool:
         report = read_report(folder / FileNames().report)
     except (OSError, NoReportError):
         return False
-    return is_outdated(report, shown_versions())
+    return is_outdated(report, folder, shown_versions(), shown_mix(context))
+
+
+def warn_of_outdated(operator: bpy.types.Operator, context: bpy.types.Context) -> None:
+    """Say so, after lightmaps were changed, if there is an export of earlier ones."""
+    if outdated_now(context):
+        operator.report({"WARNING"}, "The export is older than the lightmaps: export again")
 
 
 class RADIOSITY_OT_export(Conditional, WindowJob, bpy.types.Operator):

@@ -8,6 +8,7 @@ import bpy
 
 from ..jobs.window_job import WindowJob
 from ..session.state import session
+from .export_operators import warn_of_outdated
 from .polls import Conditional, can_relight, no_bake_runs
 
 
@@ -26,13 +27,15 @@ class RADIOSITY_OT_relight(Conditional, WindowJob, bpy.types.Operator):
         session.stop_live()
         return run_relight(context, in_background=in_window)
 
-    def _succeeded(self, _context: bpy.types.Context, _in_window: bool) -> None:
+    def _succeeded(self, context: bpy.types.Context, _in_window: bool) -> None:
         relit = f"Relit in {self._report.seconds:.2f} s"
-        if not self._report.needs_bake:
+        if self._report.needs_bake:
+            named = ", ".join(f"'{label}'" for label in self._report.needs_bake)
+            text = f"{relit} with the settings of the bake; {named} changed since: bake again"
+            self.report({"WARNING"}, text)
+        else:
             self.report({"INFO"}, relit)
-            return
-        named = ", ".join(f"'{label}'" for label in self._report.needs_bake)
-        self.report({"WARNING"}, f"{relit} with the settings of the bake; {named} changed since: bake again")
+        warn_of_outdated(self, context)
 
 
 CLASSES = (RADIOSITY_OT_relight,)

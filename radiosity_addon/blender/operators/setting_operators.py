@@ -11,7 +11,7 @@ from ..settings.preferences import preferences
 from .panel_facts import copy_targets, has_copy_targets
 from .polls import Conditional, no_bake_runs
 
-OVERRIDES = ("radiosity_mode", "radiosity_texel_scale")
+OVERRIDES = ("radiosity_mode", "radiosity_texel_scale", "radiosity_lightmap_page")
 """Settings of single objects."""
 
 
@@ -68,7 +68,7 @@ def _can_copy(context: bpy.types.Context) -> str:
 
 
 class RADIOSITY_OT_copy_overrides(Conditional, bpy.types.Operator):
-    """Copy mode and texel scale of the active object to all selected objects"""
+    """Copy mode, texel scale and page of the active object to all selected objects"""
 
     bl_idname = "radiosity.copy_overrides"
     bl_label = "Copy to Selected"
@@ -85,7 +85,7 @@ class RADIOSITY_OT_copy_overrides(Conditional, bpy.types.Operator):
                     setattr(obj, name, getattr(source, name))
                 else:
                     obj.property_unset(name)
-        self.report({"INFO"}, f"Copied mode and texel scale to {len(others)} objects")
+        self.report({"INFO"}, f"Copied mode, texel scale and page to {len(others)} objects")
         return {"FINISHED"}
 
 

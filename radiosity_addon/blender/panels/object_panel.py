@@ -24,7 +24,7 @@ class RADIOSITY_PT_object_properties(bpy.types.Panel):
         return has_role(context.object)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw mode and texel scale, and the button that copies them."""
+        """Draw mode, texel scale and page, and the button that copies them."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -41,6 +41,7 @@ def draw_overrides(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     column = layout.column()
     column.enabled = obj.radiosity_mode == BAKE
     column.prop(obj, "radiosity_texel_scale")
+    column.prop(obj, "radiosity_lightmap_page")
     layout.operator("radiosity.copy_overrides", icon="COPYDOWN")
 
 

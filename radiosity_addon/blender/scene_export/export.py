@@ -75,6 +75,7 @@ def export_steps(
     # Before anything is rendered.
     check_names(context, collected.pieces, settings)
     chosen = chosen_pieces(context, collected.pieces, settings.objects)
+    check_pages(chosen, settings)
     for piece in chosen:
         _check_uv_layers(piece)
     yield 0.5
@@ -131,6 +132,7 @@ def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) ->
                 loops=np.ascontiguousarray(mesh.loops[:, order]),
                 uv=None if uv is None else np.ascontiguousarray(uv[:, order]),
                 texel_scale=piece.role.texel_scale,
+                page=piece.role.page,
             )
         )
         in_bounces.append(np.full(len(mesh), piece.role.in_bounces))
@@ -321,6 +323,19 @@ def check_names(context: bpy.types.Context, pieces: list[Piece], settings: BakeS
             # What has no faces, or does not show, is left out anyway.
             if name not in known and name not in context.scene.objects:
                 raise UsageError(f"{option}: no object '{name}'" + _did_you_mean(name, known))
+
+
+def check_pages(chosen: list[Piece], settings: BakeSettings) -> None:
+    """Refuse pages of objects that a bake will not have."""
+    if settings.atlas != "shared" or settings.texel_density is not None:
+        return
+    beyond = next((piece for piece in chosen if piece.role.page > settings.pages), None)
+    if beyond is not None:
+        has = "1 page" if settings.pages == 1 else f"{settings.pages} pages"
+        raise UsageError(
+            f"object '{beyond.source.object_name}' is to be on page {beyond.role.page}, but the bake has "
+            f"{has}: raise the number of pages, or set the object's Page to 0"
+        )
 
 
 def _did_you_mean(name: str, known: set[str]) -> str:

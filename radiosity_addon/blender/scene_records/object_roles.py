@@ -9,14 +9,12 @@ lamp's light; both still get a lightmap.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import bpy
 
 from ...base import BakeWarning
-
-if TYPE_CHECKING:
-    from ...options import BakeSettings
+from ...options import MAX_PAGES, BakeSettings
 
 BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
 
@@ -46,6 +44,8 @@ class Role(NamedTuple):
         Whether light of surfaces and sky meets it, and whether it stops light of lamps.
     texel_scale : float
         Texels per meter relative to what others get.
+    page : int
+        The shared page that it is to be on, from 1; 0 for any.
     warnings : tuple of BakeWarning
     """
 
@@ -53,11 +53,12 @@ class Role(NamedTuple):
     in_bounces: bool
     in_shadows: bool
     texel_scale: float
+    page: int = 0
     warnings: tuple[BakeWarning, ...] = ()
 
 
 def register() -> None:
-    """Hang mode and texel scale on every object."""
+    """Hang mode, texel scale and page on every object."""
     bpy.types.Object.radiosity_mode = bpy.props.EnumProperty(
         name="Mode", description="Role of the object in a bake", items=MODES, default=BAKE
     )
@@ -70,10 +71,19 @@ def register() -> None:
         max=100.0,
         soft_max=8.0,
     )
+    bpy.types.Object.radiosity_lightmap_page = bpy.props.IntProperty(
+        name="Page",
+        description="The page of the shared lightmap that the object is on, from 1 to the number of pages; "
+        "0 = the emptiest",
+        default=0,
+        min=0,
+        max=MAX_PAGES,
+    )
 
 
 def unregister() -> None:
-    """Take both away; what a file holds stays in the file."""
+    """Take them away; what a file holds stays in the file."""
+    del bpy.types.Object.radiosity_lightmap_page
     del bpy.types.Object.radiosity_texel_scale
     del bpy.types.Object.radiosity_mode
 
@@ -131,6 +141,9 @@ def role_of(
         in_bounces=all(obj.visible_diffuse for obj in both),
         in_shadows=all(obj.visible_shadow for obj in both),
         texel_scale=scale,
+        page=next(
+            (page for obj in reversed(both) if (page := getattr(obj, "radiosity_lightmap_page", 0))), 0
+        ),
         warnings=tuple(warnings),
     )
 

@@ -37,21 +37,26 @@ export async function loadLit(url, { matte = false, read = null, loader = new GL
 export class LitScene {
   constructor(gltf, index, pages, groups, matte) {
     Object.assign(this, { gltf, scene: gltf.scene, index, pages, groups });
+    for (const group of groups) group.exported = [...group.factor];
     this.textures = pages.map(textureOf);
     this.materials = new Map();
     this.scene.traverse((mesh) => {
       if (!mesh.isMesh) return;
-      const list = [mesh.material].flat().map((material) => this.#lit(material, matte));
+      const list = [mesh.material].flat().map((material) => this.#lit(material, matte, placeOf(mesh)));
       mesh.material = Array.isArray(mesh.material) ? list : list[0];
     });
   }
 
-  #lit(material, matte) {
+  #lit(material, matte, place) {
     const lightmap = material.userData.lightmap;
     if (!lightmap) return material;
-    if (!this.materials.has(material)) this.materials.set(material, matte ? matteOf(material) : material);
-    const made = this.materials.get(material);
-    made.lightMap = this.textures[lightmap.page];
+    const key = place ? `${material.uuid} ${place.scale} ${place.offset}` : material;
+    if (!this.materials.has(key)) {
+      this.materials.set(key, matte ? matteOf(material) : place ? material.clone() : material);
+    }
+    const made = this.materials.get(key);
+    made.userData = { ...material.userData, place, glow: made.emissive?.clone() };
+    made.lightMap = placed(this.textures[lightmap.page], place);
     made.lightMapIntensity = Math.PI; // texels hold H/π, and three.js divides by π
     made.needsUpdate = true;
     return made;
@@ -60,6 +65,13 @@ export class LitScene {
   /** Mix light groups: factors by name, color times strength; those that are not named keep theirs. */
   mix(factors) {
     for (const group of this.groups) group.factor = factors[group.name] ?? group.factor;
+    for (const made of this.materials.values()) {
+      const { glow, lightmap } = made.userData;
+      const group = this.groups.find((each) => each.name === lightmap.light_group);
+      if (!group || !glow) continue;
+      const ratio = group.factor.map((factor, c) => factor / (group.exported[c] || 1));
+      made.emissive.setRGB(glow.r * ratio[0], glow.g * ratio[1], glow.b * ratio[2]);
+    }
     this.pages.forEach((page, number) => {
       const sum = new Float32Array(4 * page.width * page.height).fill(1);
       for (let texel = 0; texel < sum.length; texel += 4) sum[texel] = sum[texel + 1] = sum[texel + 2] = 0;
@@ -74,9 +86,15 @@ export class LitScene {
       const texture = this.textures[number] = prepared(
         new DataTexture(sum, page.width, page.height, RGBAFormat, FloatType));
       for (const made of this.materials.values()) {
-        if (made.userData.lightmap.page === number) made.lightMap = texture;
+        if (made.userData.lightmap.page === number) made.lightMap = placed(texture, made.userData.place);
       }
     });
+  }
+
+  /** Where a coordinate of a mesh's second set is on its page: instances of one mesh have a place each. */
+  onPage(mesh, u, v) {
+    const { scale, offset } = placeOf(mesh) ?? { scale: [1, 1], offset: [0, 0] };
+    return [u * scale[0] + offset[0], v * scale[1] + offset[1]];
   }
 
   /** The irradiance [W/m²] at a lightmap coordinate of a page: texel H/π times π, bilinear. */
@@ -94,6 +112,21 @@ export class LitScene {
     }
     return found;
   }
+}
+
+/** The scale and offset of a mesh that instances share: on its node, which a mesh of several materials is below. */
+function placeOf(mesh) {
+  return [mesh, mesh.parent].map((each) => each?.userData.lightmap).find((told) => told?.scale) ?? null;
+}
+
+/** A texture at a place: a clone, which shares the image. */
+function placed(texture, place) {
+  if (!place) return texture;
+  const clone = texture.clone();
+  clone.repeat.fromArray(place.scale);
+  clone.offset.fromArray(place.offset);
+  clone.needsUpdate = true;
+  return clone;
 }
 
 function clamp(value, count) {

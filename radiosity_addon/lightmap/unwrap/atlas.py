@@ -20,13 +20,13 @@ from ..charts import Charts, PatientGrower, join_charts, rescale_to_area, split_
 from ..texels import coverage_sum
 from .align import chart_extents
 from .atlas_input import AtlasInput, AtlasOptions
-from .collapse import chart_places
 from .cut_empty import cut_empty_charts
 from .distortion import Stretched, stretched_faces, stretched_warnings
-from .dominant_object import greedy_object, share_of
 from .kept_uvs import are_apart, has_area, is_collapsed, overlaps
-from .packing import Limits, Packing, pack, page_size
+from .layouts import Layout, greedy_of, pack_page, surface_of
+from .packing import Packing, page_size
 from .page_assignment import ChartTotals, assign_pages
+from .same_shapes import same_shapes
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -73,15 +73,6 @@ class Atlas:
     stretched: tuple[Stretched, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """One object's charts, and whether they are UVs to keep."""
-
-    source: AtlasInput
-    charts: Charts
-    kept: bool
-
-
 def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: Progress = SILENT) -> Atlas:
     """Lay out all objects.
 
@@ -98,8 +89,14 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
     if not objects:
         raise BakeError("there is no mesh to lay out: give an object with faces to bake")
     warnings: list[BakeWarning] = []
-    layouts = _lay_flat(objects, options, warnings, progress.part(0.0, 0.7))
-    layouts = _cut_empty(layouts, options)
+    shape = same_shapes(objects) if options.rectangles else list(range(len(objects)))
+    different = sorted(set(shape))
+    flat = _lay_flat([objects[each] for each in different], options, warnings, progress.part(0.0, 0.7))
+    by_shape = dict(zip(different, _cut_empty(flat, options), strict=True))
+    layouts = [
+        replace(by_shape[each], source=source, shape=each)
+        for source, each in zip(objects, shape, strict=True)
+    ]
     laid = _lay_on_pages(layouts, options, progress.part(0.7, 1.0))
     placed: list[AtlasObject | None] = [None] * len(layouts)
     for number, (group, packing) in enumerate(laid):
@@ -115,7 +112,7 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
 
 
 def _stretched(
-    layouts: list[_Layout], placed: tuple[AtlasObject, ...], pages: tuple[AtlasPage, ...]
+    layouts: list[Layout], placed: tuple[AtlasObject, ...], pages: tuple[AtlasPage, ...]
 ) -> list[Stretched]:
     """Return what is stretched of the objects that were laid out here."""
     found: list[Stretched] = []
@@ -146,33 +143,36 @@ _Laid = list[tuple[list[int], Packing]]
 """Per page the numbers of its objects, and how they lie there."""
 
 
-def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progress) -> _Laid:
+def _lay_on_pages(layouts: list[Layout], options: AtlasOptions, progress: Progress) -> _Laid:
     """Pack objects on as many pages as are requested or needed."""
     density = options.texel_density
     totals = _totals(layouts, options.limits.padding)
-    count = len(layouts)
+    count, wanted = len(layouts), [layout.source.page for layout in layouts]
     if options.shared:
         count = options.pages
         if density is not None:
             count = totals.least_pages(density, options.limits.side)
+    count = max(count, *wanted)
+    before: list[list[int]] = []
     while True:
         common = totals.density(float(count * options.resolution**2)) if density is None else density
         texels = totals.texels(common)
-        groups = assign_pages(texels, count) if options.shared else [[each] for each in range(count)]
+        groups = assign_pages(texels, count, wanted) if options.shared else [[each] for each in range(count)]
         laid: _Laid = []
+        group: list[int] = []
         try:
             for group in groups:
                 laid.append((group, _pack_group([layouts[each] for each in group], options, progress)))
         except BakeError:
             # What does not fit at the requested density may fit on more pages.
-            if density is None or len(groups) == len(layouts):
+            if density is None or len(group) == 1 or groups == before:
                 raise
-            count = max(count, len(groups)) + 1
+            count, before = max(count, len(groups)) + 1, groups
             continue
         return laid
 
 
-def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
+def _cut_empty(layouts: list[Layout], options: AtlasOptions) -> list[Layout]:
     """Cut charts that are mostly empty at about the density that there will be."""
     padding, density = options.limits.padding, options.texel_density
     if density is None:
@@ -195,9 +195,9 @@ def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
     return [layout if layout.kept else replace(layout, charts=next(charts)) for layout in layouts]
 
 
-def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
+def _totals(layouts: list[Layout], padding: int) -> ChartTotals:
     """Return the sums over each object's charts, at its scale."""
-    areas = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
+    areas = [surface_of([layout]) * layout.source.scale**2 for layout in layouts]
     lengths = [
         float(chart_extents(layout.charts.uv, layout.charts.chart, layout.charts.count).sum())
         for layout in layouts
@@ -206,17 +206,17 @@ def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
     return ChartTotals(np.array(areas), np.array(lengths), np.array(counts), padding)
 
 
-def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress) -> Packing:
+def _pack_group(group: list[Layout], options: AtlasOptions, progress: Progress) -> Packing:
     """Lay out one page, its kept UVs as they are where that is possible."""
     kept = _kept_as_they_are(group, options.resolution, options.texel_density, options.limits.side)
     if kept is not None:
         return kept
-    return _pack_page(group, options.resolution, options.texel_density, options.limits, progress)
+    return pack_page(group, options, progress)
 
 
 def _lay_flat(
     objects: Sequence[AtlasInput], options: AtlasOptions, warnings: list[BakeWarning], progress: Progress
-) -> list[_Layout]:
+) -> list[Layout]:
     """Cut objects into charts, or take the UVs they have."""
     # A density's page is not known yet, and may be as large as any.
     probe = _PROBE if options.texel_density is not None else min(options.resolution, _PROBE)
@@ -224,8 +224,10 @@ def _lay_flat(
     cut = [source for source, charts in zip(objects, kept, strict=True) if charts is None]
     found = iter(_unwrapped(cut, options, warnings, progress))
     return [
-        _Layout(source, _scaled(next(found) if charts is None else charts, source.scale), charts is not None)
-        for source, charts in zip(objects, kept, strict=True)
+        Layout(
+            source, _scaled(next(found) if charts is None else charts, source.scale), charts is not None, row
+        )
+        for row, (source, charts) in enumerate(zip(objects, kept, strict=True))
     ]
 
 
@@ -290,7 +292,7 @@ def _kept_charts(
 
 
 def _kept_as_they_are(
-    group: list[_Layout], resolution: int, density: float | None, largest: int
+    group: list[Layout], resolution: int, density: float | None, largest: int
 ) -> Packing | None:
     """Return the page of kept UVs left bit for bit, None if they must be packed."""
     if not all(layout.kept for layout in group):
@@ -299,7 +301,7 @@ def _kept_as_they_are(
     uv = np.concatenate(kept).astype(np.float32, copy=False)
     if len(group) > 1 and not are_apart(kept, min(resolution, _PROBE)):
         return None
-    surface = _surface(group)
+    surface = surface_of(group)
     flat = float(0.5 * np.abs(signed_double_areas(uv.astype(np.float64))).sum())
     if density is not None:
         size = density * np.sqrt(surface / flat)
@@ -312,81 +314,14 @@ def _kept_as_they_are(
     return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)
 
 
-def _pack_page(
-    group: list[_Layout], resolution: int, density: float | None, limits: Limits, progress: Progress
-) -> Packing:
-    """Pack the charts of several objects together; triangles without area get a harmless place."""
-    uv = np.concatenate([layout.charts.uv for layout in group])
-    first = np.cumsum([0] + [layout.charts.count for layout in group])
-    chart = np.concatenate(
-        [
-            np.where(layout.charts.chart >= 0, layout.charts.chart + start, -1)
-            for layout, start in zip(group, first[:-1], strict=True)
-        ]
-    )
-    used = np.flatnonzero(chart >= 0)
-    if not len(used):
-        return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
-    places = chart_places(_corners(group)[used], chart[used], _share_groups(group)[used])
-    try:
-        packing = pack(uv[used], chart[used], resolution, density, limits, progress, places)
-    except BakeError as error:
-        alone = f"object '{group[0].source.name}': " if len(group) == 1 else ""
-        raise BakeError(f"{alone}{error}{_greedy(group)[1]}") from None
-    pages = np.empty(uv.shape, dtype=np.float32)
-    pages[used] = packing.uv
-    _park(pages, chart, [len(layout.source.triangles) for layout in group])
-    return Packing(pages, packing.resolution, packing.density, packing.crowded)
-
-
-def _share_groups(group: list[_Layout]) -> Int:
-    """Return a number for each triangle: only those of one object and kind share texels, −1 for kept UVs."""
-    number = np.repeat(np.arange(len(group)), [len(layout.source.triangles) for layout in group])
-    kind = np.concatenate([_kinds(layout.source) for layout in group])
-    kept = np.array([layout.kept for layout in group])
-    return np.where(kept[number], -1, numbered(np.column_stack((number, kind))))
-
-
-def _kinds(source: AtlasInput) -> Int:
-    return np.zeros(len(source.triangles), dtype=np.int64) if source.kind is None else source.kind
-
-
-def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:
-    """Put triangles without area on a corner of their own object, else of the page's first."""
-    start = 0
-    fallback = uv[np.flatnonzero(chart >= 0)[0], 0].copy()
-    for length in lengths:
-        rows = np.arange(start, start + length)
-        placed = rows[chart[rows] >= 0]
-        uv[rows[chart[rows] < 0]] = uv[placed[0], 0] if len(placed) else fallback
-        start += length
-
-
 def _page(packing: Packing) -> AtlasPage:
     area = 0.5 * np.abs(signed_double_areas(packing.uv.astype(np.float64))).sum()
     return AtlasPage(packing.resolution, packing.density, min(float(area), 1.0))
 
 
-def _surface(group: list[_Layout]) -> float:
-    """Return the area of all triangles [m²]."""
-    return float(triangle_areas(_corners(group)).sum())
-
-
-def _corners(group: list[_Layout]) -> Float:
-    return np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
-
-
-def _greedy(group: list[_Layout]) -> tuple[str, str]:
-    """Return which object takes nearly all of the surface, and words on it; empty if none does."""
-    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
-    name = greedy_object([layout.source.name for layout in group], surfaces) or ""
-    taken = share_of(max(surfaces), sum(surfaces)) if name else ""
-    return name, name and f"; object '{name}' takes {taken} of the surface: lower its texel scale"
-
-
-def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
+def _crowded(group: list[Layout], resolution: int) -> BakeWarning:
     count = sum(layout.charts.count for layout in group)
-    greedy, fix = _greedy(group)
+    greedy, fix = greedy_of(group)
     return BakeWarning(
         group[0].source.name if len(group) == 1 else greedy or "atlas",
         f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them"

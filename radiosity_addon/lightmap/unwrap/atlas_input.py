@@ -30,6 +30,8 @@ class AtlasInput:
         Its texels per meter, relative to the other objects.
     kind : (n,) int or None
         Only triangles of one kind share texels; None if all are alike.
+    page : int
+        The shared page that it is to be on, from 1; 0 for any.
     """
 
     name: str
@@ -38,6 +40,7 @@ class AtlasInput:
     uv: Float32 | None = None
     scale: float = 1.0
     kind: NDArray[np.int64] | None = None
+    page: int = 0
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,8 @@ class AtlasOptions:
         Of every page.
     unwrap_seconds : float
         After so long an object's rest is cut into charts by the directions its faces look.
+    rectangles : bool
+        Each object has a rectangle of its own, and instances of a shape have the same layout in theirs.
     threads : int
         Pieces of large objects that are cut at once; 0 means all cores.
     """
@@ -69,3 +74,4 @@ class AtlasOptions:
     limits: Limits = field(default_factory=Limits)
     unwrap_seconds: float = 60.0
     threads: int = 0
+    rectangles: bool = False

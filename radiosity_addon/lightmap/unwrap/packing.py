@@ -118,7 +118,7 @@ def padding_for(mip_levels: int) -> int:
 
 
 @dataclass(frozen=True)
-class _Job:
+class ChartJob:
     """Aligned charts, the orders worth trying, and where charts are if some may collapse."""
 
     uv: Float
@@ -162,9 +162,9 @@ def pack(
     BakeError
         If the density asks for more than the largest page.
     """
-    job = _job(uv, chart, limits or Limits(), places)
+    job = chart_job(uv, chart, limits or Limits(), places)
     if density is not None:
-        return _pack_at(job, density)
+        return pack_at(job, density)
     finer = resolution
     while (packing := _pack_into(job, finer, resolution, progress)) is None:
         # Too small to keep the charts apart: pack a finer page and shrink it.
@@ -173,7 +173,8 @@ def pack(
     return packing
 
 
-def _job(uv: Float, chart: Int, limits: Limits, places: ChartPlaces | None) -> _Job:
+def chart_job(uv: Float, chart: Int, limits: Limits, places: ChartPlaces | None) -> ChartJob:
+    """Return charts prepared for packing; for `places` see `pack`."""
     count = int(chart.max()) + 1
     aligned = align(uv, chart, count)
     extent = np.zeros((count, 2))
@@ -186,7 +187,7 @@ def _job(uv: Float, chart: Int, limits: Limits, places: ChartPlaces | None) -> _
     area = float(0.5 * np.abs(signed_double_areas(aligned)).sum())
     # A few charts have room for their gaps.
     places = places if count > FEW_CHARTS else None
-    return _Job(aligned, chart, extent, tuple(orders), area, limits, places)
+    return ChartJob(aligned, chart, extent, tuple(orders), area, limits, places)
 
 
 @dataclass(frozen=True)
@@ -200,7 +201,7 @@ class _ScaledCharts:
     masks: tuple[ChartMasks, ChartMasks]
 
 
-def _scaled(job: _Job, scale: float, cell: int, side: int, stretch: float = 1.0) -> _ScaledCharts:
+def _scaled(job: ChartJob, scale: float, cell: int, side: int, stretch: float = 1.0) -> _ScaledCharts:
     """Return the charts at `scale` texels per meter, stretched along u, for a room of `side` cells."""
     even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell, side)
     if stretch == 1.0:
@@ -209,7 +210,7 @@ def _scaled(job: _Job, scale: float, cell: int, side: int, stretch: float = 1.0)
     return _ScaledCharts((even[0], odd[0]), (even[1], odd[1]))
 
 
-def _measured(job: _Job, scale: Float, cell: int, side: int) -> tuple[Float, ChartMasks]:
+def _measured(job: ChartJob, scale: Float, cell: int, side: int) -> tuple[Float, ChartMasks]:
     """Return cells per meter (count, 2) at `scale` (2,) texels per meter, and the cells charts cover."""
     extent = job.extent * scale
     widen = np.where(extent < MIN_CHART_WIDTH, MIN_CHART_WIDTH / np.maximum(extent, 1e-30), 1.0)
@@ -227,7 +228,7 @@ def _measured(job: _Job, scale: Float, cell: int, side: int) -> tuple[Float, Cha
     return cells, chart_masks(job.uv * cells[job.chart][:, None], job.chart, job.extent * cells)
 
 
-def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Packing | None:
+def _pack_into(job: ChartJob, resolution: int, page: int, progress: Progress) -> Packing | None:
     """Look for the largest scale that fits a page of `resolution`; None if none does.
 
     `page` is the page's real size when `resolution` is a finer stand-in for it.
@@ -268,18 +269,18 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
     return best
 
 
-def _pack_at(job: _Job, density: float) -> Packing:
-    """Find the smallest page that holds the charts at `density` texels per meter."""
+def pack_at(job: ChartJob, density: float) -> Packing:
+    """Return the smallest page that holds the charts at `density` texels per meter."""
     largest = job.limits.side
     reach = float(job.extent.max()) * density + 2 * job.limits.border(1)
     guess = max(float(np.sqrt(job.area)) * density, reach if len(job.extent) == 1 else 0.7 * reach)
     if not guess <= largest:
-        raise _too_dense(density, largest)
+        raise too_dense(density, largest)
     step = 1.0
     resolution, too_small, best = page_size(guess), 0, None
     while best is None or best.resolution - too_small > max(4, best.resolution // 256):
         if resolution > largest:
-            raise _too_dense(density, largest)
+            raise too_dense(density, largest)
         cell = -(-resolution // MAX_CELLS)
         side = resolution // cell - 2 * job.limits.border(cell)
         placed, _ = _placed(job, density, side, cell) if side > 0 else (None, 0)
@@ -298,7 +299,8 @@ def _pack_at(job: _Job, density: float) -> Packing:
     return best
 
 
-def _too_dense(density: float, largest: int) -> BakeError:
+def too_dense(density: float, largest: int) -> BakeError:
+    """Return the error of a density that needs more than the largest page."""
     return BakeError(
         f"a texel density of {density:g} px/m needs an atlas page above {largest} px: "
         "lower the density, bake fewer objects, or give each object its own page"
@@ -306,7 +308,7 @@ def _too_dense(density: float, largest: int) -> BakeError:
 
 
 def _placed(
-    job: _Job, scale: float, side: int, cell: int, stretch: float = 1.0
+    job: ChartJob, scale: float, side: int, cell: int, stretch: float = 1.0
 ) -> tuple[Float | None, float]:
     """Place the charts within a square of `side` cells, at `scale` texels per meter.
 
@@ -335,7 +337,7 @@ def _placed(
     return corners, side * cell / block.rows
 
 
-def _without(job: _Job, left_out: NDArray[np.bool_]) -> tuple[_Job, NDArray[np.intp]]:
+def _without(job: ChartJob, left_out: NDArray[np.bool_]) -> tuple[ChartJob, NDArray[np.intp]]:
     """Return the other charts, renumbered, and the triangles they have."""
     number = np.cumsum(~left_out) - 1
     rows = np.flatnonzero(~left_out[job.chart])
@@ -351,7 +353,7 @@ def _without(job: _Job, left_out: NDArray[np.bool_]) -> tuple[_Job, NDArray[np.i
 
 
 def _place(
-    job: _Job, masks: tuple[ChartMasks, ChartMasks], room: tuple[int, int], cell: int
+    job: ChartJob, masks: tuple[ChartMasks, ChartMasks], room: tuple[int, int], cell: int
 ) -> tuple[Placement | None, float]:
     """Return the first placement in a room so wide and high [cells], else None and which part was placed."""
     gap, (width, height) = job.limits.gap(cell), room
@@ -374,7 +376,7 @@ def _place(
     return None, share
 
 
-def _moved(job: _Job, scaled: _ScaledCharts, placement: Placement, cell: int) -> Float:
+def _moved(job: ChartJob, scaled: _ScaledCharts, placement: Placement, cell: int) -> Float:
     """Return (n, 3, 2) chart corners turned and moved to their place [cells]."""
     chart = job.chart
     quarter = placement.quarter[chart]

@@ -62,25 +62,38 @@ class ChartTotals:
         return max(1, int(FULL * float(self.texels(density).sum()) / largest**2))
 
 
-def assign_pages(texels: Sequence[float] | Array, pages: int) -> list[list[int]]:
+def assign_pages(
+    texels: Sequence[float] | Array, pages: int, wanted: Sequence[int] | None = None
+) -> list[list[int]]:
     """Share objects out over pages so that all are about equally full.
 
-    The largest first, each to the emptiest page. Objects of a page keep their order.
+    Those that name a page come first, then the largest, each to the emptiest page. Objects of a page keep
+    their order.
 
     Parameters
     ----------
     texels : (n,) float
         Number of texels that each object takes.
     pages : int
+    wanted : (n,) int or None
+        The page that each object names, from 1; 0, or None for all, for none.
 
     Returns
     -------
     list of list of int
         Row numbers of the objects of each page; no page is empty.
     """
-    emptiest = [(0.0, page) for page in range(min(pages, len(texels)))]
-    groups: list[list[int]] = [[] for _ in emptiest]
+    named = np.zeros(len(texels), dtype=np.int64) if wanted is None else np.asarray(wanted, dtype=np.int64)
+    free = int((named == 0).sum())
+    pages = max(min(pages, free + len(set(named[named > 0].tolist()))), int(named.max(initial=0)))
+    groups: list[list[int]] = [[] for _ in range(pages)]
+    for row in np.flatnonzero(named).tolist():
+        groups[named[row] - 1].append(row)
+    emptiest = [(sum(float(texels[row]) for row in group), page) for page, group in enumerate(groups)]
+    heapq.heapify(emptiest)
     for row in np.argsort(-np.asarray(texels), kind="stable").tolist():
+        if named[row]:
+            continue
         filled, page = heapq.heappop(emptiest)
         groups[page].append(row)
         heapq.heappush(emptiest, (filled + float(texels[row]), page))
