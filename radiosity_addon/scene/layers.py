@@ -46,6 +46,9 @@ FINE = 1.0 / 64.0
 PROBES = 32
 """Rays that decide whether a face belongs to a solid."""
 
+MOST_CROSSINGS = 8
+"""Surfaces that such a ray crosses at most."""
+
 MANY_COPIES = 4
 """Beyond this number, exact copies of one triangle are not compared pair by pair."""
 
@@ -228,7 +231,7 @@ def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tupl
 def _solid_behind(
     scene: Surfaces, caster: EmbreeCaster, triangle: Array, part: Array, tolerance: Array
 ) -> Array:
-    """Return (n,) whether most of what parts (n, k, 2) of triangles see behind them are other backs."""
+    """Return (n,) whether parts (n, k, 2) of triangles have something solid behind them, by most rays."""
     count, corners = len(triangle), scene.triangles[triangle]
     middle = part.mean(axis=1, keepdims=True)
     # Half way from the middle to the corners.
@@ -239,9 +242,27 @@ def _solid_behind(
     points = points + (lift[:, None] * back)[:, None]
     unit = stratified_square(np.arange(count), PROBES, Stream.BACK_PROBES)
     directions = to_world(cosine_hemisphere(unit), back)
-    hits = caster.intersect(points.reshape(-1, 3), directions.reshape(-1, 3))
-    inner = (hits.triangle != NO_HIT) & ~hits.front
+    inner = _leaves_solid(caster, points.reshape(-1, 3), directions.reshape(-1, 3))
     return np.asarray(inner.reshape(count, PROBES).mean(axis=1) > 0.5)
+
+
+def _leaves_solid(caster: EmbreeCaster, points: Array, directions: Array) -> Array:
+    """Return (n,) whether rays leave more solids than they enter, up to some place on their way.
+
+    What stands in a solid, as a mattress in its frame, is entered first.
+    """
+    points, left = points.copy(), np.zeros(len(points), dtype=np.int64)
+    rows = np.arange(len(points))
+    for _ in range(MOST_CROSSINGS):
+        hits = caster.intersect(points[rows], directions[rows])
+        met = np.flatnonzero(hits.triangle != NO_HIT)
+        rows = rows[met]
+        left[rows] += np.where(hits.front[met], -1, 1)
+        points[rows] += (hits.distance[met, None] + caster.surface_offset) * directions[rows]
+        rows = rows[left[rows] <= 0]
+        if len(rows) == 0:
+            break
+    return np.asarray(left > 0)
 
 
 def _covers(

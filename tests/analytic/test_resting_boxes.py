@@ -72,6 +72,12 @@ def test_the_underside_is_dark_though_light_falls_on_its_own_back() -> None:
     assert values(found["Box"]).mean() > 1.0
 
 
+def test_the_underside_is_dark_though_another_box_stands_in_the_box() -> None:
+    """As a mattress does in its frame: rays from the bottom enter it before they leave the frame."""
+    inner = solid_box((-0.45, -0.45, 0.2), (0.45, 0.45, 1.3))
+    assert values(pages(np.concatenate([BOX, inner]))["Bottom"]).max() == 0.0
+
+
 def test_so_it_is_in_a_room_and_without_one_where_the_box_reaches_beyond() -> None:
     """On a floor that is a room's, the underside is dark; over the rim of a table it is lit."""
     room = box_room((6, 6, 3))[0] - (3, 3, 0)
