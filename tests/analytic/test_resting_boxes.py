@@ -74,7 +74,7 @@ def test_the_underside_is_dark_though_light_falls_on_its_own_back() -> None:
 
 def test_the_underside_is_dark_though_another_box_stands_in_the_box() -> None:
     """As a mattress does in its frame: rays from the bottom enter it before they leave the frame."""
-    inner = solid_box((-0.45, -0.45, 0.2), (0.45, 0.45, 1.3))
+    inner = solid_box((-0.49, -0.49, 0.02), (0.49, 0.49, 1.3))
     assert values(pages(np.concatenate([BOX, inner]))["Bottom"]).max() == 0.0
 
 
