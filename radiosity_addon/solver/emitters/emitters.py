@@ -201,31 +201,48 @@ class EmitterGroup:
         Returns directions (n, 3), distances (n,), and weights (n,): their mean is the unoccluded irradiance
             per unit of exitance.
         """
-        if self._tree is not None:
-            directions, distances, _ = self.shadow_rays(points, normals, u[:, None])
-            return directions[:, 0], distances[:, 0], self.unit_irradiance(points, normals)
         directions, (distances, weights) = np.empty((len(points), 3)), np.empty((2, len(points)))
-        step = max(BLOCK_PAIRS // len(self._corners), 1)
+        step = CHUNK_POINTS if self._tree is not None else max(BLOCK_PAIRS // len(self._corners), 1)
         for first in range(0, len(points), step):
             rows = slice(first, first + step)
-            found = self._rays_to_near(points[rows], normals[rows], u[rows])
-            directions[rows], distances[rows], weights[rows] = found
+            face, along, chance = self._choose_faces(points[rows], normals[rows], u[rows, 0])
+            corners, facing = self._corners[face] - points[rows, None], self._normals[face]
+            inside = np.stack([along, u[rows, 1]], axis=1)
+            directions[rows], solid_angle = directions_to_triangles(corners, inside)
+            rise = np.einsum("nk,nk->n", directions[rows], normals[rows])
+            ahead = -np.einsum("nk,nk->n", directions[rows], facing)
+            seen = (rise > 0.0) & (ahead > 0.0) & (chance > 0.0)
+            sent = rise * solid_angle * self._level[face] / np.pi
+            weights[rows] = np.where(seen, sent / np.where(seen, chance, 1.0), 0.0)
+            reach = -np.einsum("nk,nk->n", corners[:, 0], facing) / np.where(seen, ahead, 1.0)
+            ends = directions[rows] * reach[:, None] + self._offset * facing
+            distances[rows] = np.linalg.norm(ends, axis=1)
+            directions[rows] = ends / np.maximum(distances[rows], 1e-300)[:, None]
         return directions, distances, weights
 
-    def _rays_to_near(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
-        factors = self.factors(points, normals)
-        face, along = (part[:, 0] for part in pick_in_rows(factors, u[:, :1]))
-        chosen = np.take_along_axis(factors, face[:, None], axis=1)[:, 0]
-        corners, facing = self._corners[face] - points[:, None], self._normals[face]
-        directions, solid_angle = directions_to_triangles(corners, np.stack([along, u[:, 1]], axis=1))
-        ahead = np.minimum(np.einsum("nk,nk->n", directions, facing), -1e-12)
-        distances = np.einsum("nk,nk->n", corners[:, 0], facing) / ahead
-        rise = np.maximum(np.einsum("nk,nk->n", directions, normals), 0.0)
-        sent = np.divide(rise * solid_angle * self._level[face], np.pi * chosen,
-                         out=np.zeros_like(chosen), where=chosen > 0.0)  # fmt: skip
-        ends = directions * distances[:, None] + self._offset * facing
-        distances = np.linalg.norm(ends, axis=1)
-        return ends / np.maximum(distances, 1e-300)[:, None], distances, sent * factors.sum(axis=1)
+    def _choose_faces(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Return (n,) a face for each point, u (n,) within it, and the probability of the choice or 0."""
+        if self._tree is None:
+            factors = self.factors(points, normals)
+            face, along = (part[:, 0] for part in pick_in_rows(factors, u[:, None]))
+            chosen = np.take_along_axis(factors, face[:, None], axis=1)[:, 0]
+            return face, along, chosen / np.maximum(factors.sum(axis=1), 1e-300)
+        tree, pairs = self._tree, self._tree.ask(points, normals)
+        count = np.bincount(pairs.row, minlength=len(points))
+        face, (along, chance) = np.zeros(len(points), dtype=np.int64), np.zeros((2, len(points)))
+        lit = np.flatnonzero(count)
+        if len(lit):
+            first = run_starts(count)[lit, None]
+            running = running_sums(pairs.factor)
+            which, within = pick_in_runs(running, u[lit, None], first, first + count[lit, None])
+            node, within, below = tree.descend(points[lit], pairs.node[which[:, 0]], within[:, 0])
+            begin, end = tree.begin[node], tree.end[node]
+            slot, within = pick_in_runs(tree.running, within[:, None], begin[:, None], end[:, None])
+            total = np.bincount(pairs.row, pairs.factor, len(points))[lit]
+            part = np.diff(tree.running)[slot[:, 0]] / (tree.running[end] - tree.running[begin])
+            chance[lit] = pairs.factor[which[:, 0]] / total * below * part
+            face[lit], along[lit] = tree.order[slot[:, 0]], within[:, 0]
+        return face, along, chance
 
     def _rays_by_tree(
         self, tree: EmitterTree, points: Array, normals: Array, u: Array

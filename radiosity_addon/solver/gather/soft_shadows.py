@@ -159,16 +159,20 @@ def _shadowed(
         length = np.sqrt(np.einsum("rkc,rkc->rk", along, along))
         directions = along / np.maximum(length, 1e-300)[..., None]
         distances = np.where(finite, length, np.inf)
+        if isinstance(light, EmitterGroup):
+            # Next to a face the light at a start is not that in the center; it may even be behind the face.
+            near = np.flatnonzero(light.is_near(center, spread.width(chunk)))
+            own = (
+                start[near].reshape(-1, 3),
+                np.repeat(normal[near], count, axis=0),
+                unit[near].reshape(-1, 2),
+            )
+            directions[near], distances[near], weights[near] = (
+                found.reshape(len(near), count, *found.shape[1:]) for found in light.rays_from(*own)
+            )
     if at.lift is not None:
         start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
     start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
-    if at.sampler is not None and isinstance(light, EmitterGroup):
-        # Next to a face the light at a start is not that in the center; it may even be behind the face.
-        near = np.flatnonzero(light.is_near(center, spread.width(chunk)))
-        own = start[near].reshape(-1, 3), np.repeat(normal[near], count, axis=0), unit[near].reshape(-1, 2)
-        directions[near], distances[near], weights[near] = (
-            found.reshape(len(near), count, *found.shape[1:]) for found in light.rays_from(*own)
-        )
     point, sample = np.nonzero(weights > 0)
     ray = (point, sample)
     free = passing_light(caster, start[ray], directions[ray], distances[ray])
