@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from radiosity_addon.lights import EnvironmentLight
 from radiosity_addon.scene import BakeScene, Scene, SurfaceImages
 from tests.relit_rooms import BAKED, lit_room
-from tests.rooms import gray, rectangle
+from tests.rooms import gray, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 COLOR = np.array([0.9, 0.5, 0.2])
@@ -63,6 +64,27 @@ def glazed(
         in_bounces=seen,
         in_shadows=seen,
         **given,
+    )
+
+
+def bright_boxes(*half_sizes: float) -> Scene:
+    """A white floor and closed boxes in one another, under a sky of radiance 1.
+
+    By an Add Shader the boxes' blue is reflected and passes: 1.42 of what arrives, if nothing bounds it.
+    """
+    boxes = [solid_box((-s, -s, 0.05), (s, s, 0.05 + 2 * s)) for s in half_sizes]
+    scene = glazed(floor(), np.concatenate(boxes), np.array((0.2, 0.06, 0.78)), reflectance=0.8)
+    images = scene.images
+    assert images is not None
+    values = images.values.copy()
+    values[..., :3] = (0.38, 0.81, 0.99)
+    return Scene(
+        scene.triangles,
+        scene.reflectance,
+        scene.emission,
+        two_sided=True,
+        lights=[EnvironmentLight((1.0, 1.0, 1.0))],
+        images=SurfaceImages(values, images.image_uv, images.textured, images.passes, images.glass),
     )
 
 

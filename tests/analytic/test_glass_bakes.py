@@ -18,8 +18,9 @@ from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.lightmap.points import smoothing
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
-from tests.glass_rooms import SCREEN_COLOR, glazed_room
+from tests.glass_rooms import SCREEN_COLOR, bright_boxes, glazed_room
 from tests.relit_rooms import BAKED, CHANGED
+from tests.unit.texel_scenes import bake_scene
 
 SETTINGS = BakeSettings(resolution=64, quality="draft")
 
@@ -93,6 +94,19 @@ def test_a_sidecar_relights_to_the_last_bit(room: tuple[BakeResult, KeptBake], t
     fresh = replace(kept, lit=replace(kept.lit, warm_start=kept.lit.warm_start.first()))
     again = read_sidecar(tmp_path / "room.relight").kept(glazed_room())
     np.testing.assert_array_equal(relit(again, CHANGED), relit(fresh, CHANGED))
+
+
+@pytest.mark.parametrize("boxes", [(0.3,), (0.3, 0.2)], ids=["one box", "two boxes"])
+def test_sweeps_converge_where_paint_and_glass_are_added(boxes: tuple[float, ...]) -> None:
+    """Under a sky of radiance 1 no irradiance exceeds π, up to the noise of tinted rays.
+
+    Before reflectance was bounded by what passes, blue grew with each sweep between two boxes.
+    """
+    scene = bright_boxes(*boxes)
+    parts = ("Floor", 2), ("Boxes", len(scene) - 2)
+    found = pixels(bake(bake_scene(scene, *parts), replace(SETTINGS, resolution=16, quantity="irradiance")))
+    assert found.max() < 1.2 * np.pi
+    assert found.mean(axis=0).max() < np.pi
 
 
 def moved_room(by: float, uv: np.ndarray | None = None) -> BakeScene:
