@@ -67,17 +67,20 @@ def glazed(
     )
 
 
-def bright_boxes(*half_sizes: float) -> Scene:
-    """A white floor and closed boxes in one another, under a sky of radiance 1.
+PAINTED_PASSES, PAINTED_REFLECTANCE = np.array([0.2, 0.06, 0.78]), np.array([0.38, 0.81, 0.99])
+"""Of paint added to glass: of blue 1.42 of what arrives would be sent on, if nothing bounded it."""
 
-    By an Add Shader the boxes' blue is reflected and passes: 1.42 of what arrives, if nothing bounds it.
-    """
+
+def painted_boxes(
+    *half_sizes: float, passes: np.ndarray = PAINTED_PASSES, reflectance: np.ndarray = PAINTED_REFLECTANCE
+) -> Scene:
+    """A white floor and closed boxes in one another that pass and reflect, under a sky of radiance 1."""
     boxes = [solid_box((-s, -s, 0.05), (s, s, 0.05 + 2 * s)) for s in half_sizes]
-    scene = glazed(floor(), np.concatenate(boxes), np.array((0.2, 0.06, 0.78)), reflectance=0.8)
+    scene = glazed(floor(), np.concatenate(boxes), passes, reflectance=0.8)
     images = scene.images
     assert images is not None
     values = images.values.copy()
-    values[..., :3] = (0.38, 0.81, 0.99)
+    values[..., :3] = reflectance
     return Scene(
         scene.triangles,
         scene.reflectance,

@@ -17,7 +17,7 @@ from radiosity_addon.solver import (
     SunLight,
     solve,
 )
-from tests.glass_rooms import COLOR, WHOLE, bright_boxes, closed_pane, floor, glazed, pane
+from tests.glass_rooms import COLOR, WHOLE, closed_pane, floor, glazed, painted_boxes, pane
 from tests.rooms import box_room, gray, rectangle, solid_box
 
 POINTS = np.array([(0.1, 0.2, 0.0), (0.5, -0.3, 0.0), (-0.4, 0.6, 0.0)])
@@ -142,7 +142,7 @@ def test_power_is_absorbed_by_surfaces_and_glass_or_escapes(light: str) -> None:
 @pytest.mark.parametrize("boxes", [(0.3,), (0.3, 0.2)], ids=["one box", "two boxes"])
 def test_glass_and_paint_together_make_no_light(boxes: tuple[float, ...]) -> None:
     """Under a sky of radiance 1 nothing gets more than π, whatever it reflects and passes."""
-    found = solved(bright_boxes(*boxes)).triangle_irradiance
+    found = solved(painted_boxes(*boxes)).triangle_irradiance
     assert found.max() <= np.pi * (1 + 1e-6)
 
 
