@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from radiosity_addon.lights import EnvironmentLight
 from radiosity_addon.scene import BakeScene, Scene, SurfaceImages
 from tests.relit_rooms import BAKED, lit_room
-from tests.rooms import gray, rectangle
+from tests.rooms import gray, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 COLOR = np.array([0.9, 0.5, 0.2])
@@ -63,6 +64,30 @@ def glazed(
         in_bounces=seen,
         in_shadows=seen,
         **given,
+    )
+
+
+PAINTED_PASSES, PAINTED_REFLECTANCE = np.array([0.2, 0.06, 0.78]), np.array([0.38, 0.81, 0.99])
+"""Of paint added to glass: of blue 1.42 of what arrives would be sent on, if nothing bounded it."""
+
+
+def painted_boxes(
+    *half_sizes: float, passes: np.ndarray = PAINTED_PASSES, reflectance: np.ndarray = PAINTED_REFLECTANCE
+) -> Scene:
+    """A white floor and closed boxes in one another that pass and reflect, under a sky of radiance 1."""
+    boxes = [solid_box((-s, -s, 0.05), (s, s, 0.05 + 2 * s)) for s in half_sizes]
+    scene = glazed(floor(), np.concatenate(boxes), passes, reflectance=0.8)
+    images = scene.images
+    assert images is not None
+    values = images.values.copy()
+    values[..., :3] = reflectance
+    return Scene(
+        scene.triangles,
+        scene.reflectance,
+        scene.emission,
+        two_sided=True,
+        lights=[EnvironmentLight((1.0, 1.0, 1.0))],
+        images=SurfaceImages(values, images.image_uv, images.textured, images.passes, images.glass),
     )
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeVar
 
+import numpy as np
 import numpy.typing as npt
 
 Value = TypeVar("Value", float, npt.NDArray[Any])
@@ -124,3 +125,15 @@ def luminous(radiant: npt.NDArray[Any], efficacy: float) -> npt.NDArray[Any]:
 
 MAX_REFLECTANCE = 0.99
 """Reflectances are clamped here: at 1 a closed room has no solution."""
+
+
+def most_reflectance(opacity: npt.NDArray[Any], passes: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return (…, 3) the largest reflectance of surfaces where they are there, by channel.
+
+    A surface of opacity α reflects α ρ of what arrives on all of it; with what passes that must stay below 1.
+
+    opacity (…,): 1 − the mean of `passes`.
+    passes (…, 3): The share of each channel that goes straight through.
+    """
+    there = np.where(opacity > 0, opacity, 1.0)[..., None]
+    return np.asarray(np.minimum(MAX_REFLECTANCE * (1.0 - passes) / there, MAX_REFLECTANCE))

@@ -17,7 +17,15 @@ from functools import cached_property
 import numpy as np
 
 from ..base import SceneError
-from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array, points_at, split_in_four, texels_around
+from ..numerics import (
+    MAX_REFLECTANCE,
+    WHOLE_TRIANGLE,
+    Array,
+    most_reflectance,
+    points_at,
+    split_in_four,
+    texels_around,
+)
 
 CHANNELS = 7
 """Reflectance RGB, emission RGB, opacity."""
@@ -44,9 +52,9 @@ ROUNDING = 1e-4
 class SurfaceImages:
     """Reflectance, emission and opacity of triangles as one image.
 
-    values (h, w, 7): Reflectance RGB in [0, 1], clamped like a scene's; exitance RGB of each emitting side
-        [W/m²]; opacity in [0, 1]. Linear, row 0 is v = 0. Reflectance and emission are those of the
-        existing surface, not multiplied by opacity.
+    values (h, w, 7): Reflectance RGB in [0, 1], clamped like a scene's, and to what `passes` leaves of each
+        channel (`most_reflectance`); exitance RGB of each emitting side [W/m²]; opacity in [0, 1]. Linear,
+        row 0 is v = 0. Reflectance and emission are those of the existing surface, not multiplied by opacity.
     image_uv (t, 3, 2): The corners of every scene triangle in the image, in [0, 1]; texel (r, c) covers [c/w,
         (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the triangle:
         neighbors in the image need a border of their own texels.
@@ -90,15 +98,17 @@ class SurfaceImages:
         self.image_uv = np.clip(self.image_uv, 0.0, 1.0)
         self.image_uv[~self.textured] = 0.0
         self.values = np.maximum(np.where(np.isfinite(self.values), self.values, 0.0), 0.0)
-        self.values[..., :3] = np.minimum(self.values[..., :3], MAX_REFLECTANCE)
         self.values[..., 6] = np.minimum(self.values[..., 6], 1.0)
+        most: float | Array = MAX_REFLECTANCE
+        if self.passes is not None:
+            self.passes = np.clip(np.where(np.isfinite(self.passes), self.passes, 0.0), 0.0, 1.0)
+            most = most_reflectance(self.values[..., 6], self.passes)
+        self.values[..., :3] = np.minimum(self.values[..., :3], most)
         self._weighed = self.values
         if not (self.values[..., 6] == 1.0).all():
             self._weighed = self.values.copy()
             self._weighed[..., :6] *= self.values[..., 6:]
         self._opacity = np.ascontiguousarray(self.values[..., 6:])
-        if self.passes is not None:
-            self.passes = np.clip(np.where(np.isfinite(self.passes), self.passes, 0.0), 0.0, 1.0)
 
     def __len__(self) -> int:
         return len(self.textured)

@@ -17,7 +17,7 @@ from radiosity_addon.solver import (
     SunLight,
     solve,
 )
-from tests.glass_rooms import COLOR, WHOLE, closed_pane, floor, glazed, pane
+from tests.glass_rooms import COLOR, WHOLE, closed_pane, floor, glazed, painted_boxes, pane
 from tests.rooms import box_room, gray, rectangle, solid_box
 
 POINTS = np.array([(0.1, 0.2, 0.0), (0.5, -0.3, 0.0), (-0.4, 0.6, 0.0)])
@@ -137,6 +137,13 @@ def test_power_is_absorbed_by_surfaces_and_glass_or_escapes(light: str) -> None:
     assert 0.05 * watts["absorbed"] < watts["absorbed_by_glass"] < watts["absorbed"]
     if light == "lamp":  # panels shine to the outside, too
         assert watts["escaped"] == pytest.approx(0.0, abs=1e-4 * watts["emitted"])
+
+
+@pytest.mark.parametrize("boxes", [(0.3,), (0.3, 0.2)], ids=["one box", "two boxes"])
+def test_glass_and_paint_together_make_no_light(boxes: tuple[float, ...]) -> None:
+    """Under a sky of radiance 1 nothing gets more than π, whatever it reflects and passes."""
+    found = solved(painted_boxes(*boxes)).triangle_irradiance
+    assert found.max() <= np.pi * (1 + 1e-6)
 
 
 def test_white_glass_is_not_there() -> None:

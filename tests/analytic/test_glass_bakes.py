@@ -18,8 +18,9 @@ from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.lightmap.points import smoothing
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
-from tests.glass_rooms import SCREEN_COLOR, glazed_room
+from tests.glass_rooms import SCREEN_COLOR, glazed_room, painted_boxes
 from tests.relit_rooms import BAKED, CHANGED
+from tests.unit.texel_scenes import bake_scene
 
 SETTINGS = BakeSettings(resolution=64, quality="draft")
 
@@ -93,6 +94,34 @@ def test_a_sidecar_relights_to_the_last_bit(room: tuple[BakeResult, KeptBake], t
     fresh = replace(kept, lit=replace(kept.lit, warm_start=kept.lit.warm_start.first()))
     again = read_sidecar(tmp_path / "room.relight").kept(glazed_room())
     np.testing.assert_array_equal(relit(again, CHANGED), relit(fresh, CHANGED))
+
+
+@pytest.mark.parametrize("boxes", [(0.3,), (0.3, 0.2)], ids=["one box", "two boxes"])
+def test_sweeps_converge_where_paint_and_glass_are_added(boxes: tuple[float, ...]) -> None:
+    """Under a sky of radiance 1 no irradiance exceeds π, up to the noise of tinted rays.
+
+    Before reflectance was bounded by what passes, blue grew with each sweep between two boxes.
+    """
+    scene = painted_boxes(*boxes)
+    parts = ("Floor", 2), ("Boxes", len(scene) - 2)
+    found = pixels(bake(bake_scene(scene, *parts), replace(SETTINGS, resolution=16, quantity="irradiance")))
+    assert found.max() < 1.2 * np.pi
+    assert found.mean(axis=0).max() < np.pi
+
+
+def test_a_sidecar_of_rays_through_many_painted_panes_is_read(tmp_path: Path) -> None:
+    """Red passes each surface by a chance of a sixth and with three times its light."""
+    scene = painted_boxes(
+        *0.04 + 0.03 * np.arange(8), passes=np.array([0.5, 0.0, 0.0]), reflectance=np.full(3, 0.5)
+    )
+    baked = bake_scene(scene, ("Floor", 2), ("Boxes", len(scene) - 2))
+    result, kept = bake_and_keep(baked, replace(SETTINGS, resolution=16))
+    tints = kept.lit.transport.links.tints
+    assert tints is not None
+    assert tints.max() == 3.0**4
+    write_sidecar(tmp_path / "boxes.relight", kept, result, "mark")
+    again = read_sidecar(tmp_path / "boxes.relight").kept(baked)
+    np.testing.assert_array_equal(again.lit.transport.links.tints, tints)
 
 
 def moved_room(by: float, uv: np.ndarray | None = None) -> BakeScene:

@@ -64,6 +64,26 @@ def test_partial_transmission_leaves_the_rest_of_the_surface() -> None:
     assert not half.is_clear
 
 
+def test_paint_added_to_glass_reflects_what_does_not_pass() -> None:
+    material = shader_material("Sum", "ShaderNodeAddShader")
+    tree = material.node_tree
+    add = next(node for node in tree.nodes if node.type == "ADD_SHADER")
+    for socket, (shader, color) in zip(
+        add.inputs, {"Transparent": TINT, "Diffuse": (0.1, 0.5, 0.5, 1)}.items(), strict=True
+    ):
+        made = add_node(tree, f"ShaderNodeBsdf{shader}", Color=color)
+        tree.links.new(made.outputs[0], socket)
+    surface = read(material)
+    np.testing.assert_allclose(passed(surface), TINT[:3], rtol=1e-6)
+    # Red has 0.2 left of which it uses half, green 0.6 of which it uses 0.5.
+    np.testing.assert_allclose(surface.reflectance * surface.opacity, (0.1, 0.5, 0.5), rtol=1e-6)
+    assert surface.warnings == ()
+    tree.nodes["Diffuse BSDF"].inputs["Color"].default_value = (0.5, 0.5, 0.5, 1)
+    surface = read(material)
+    np.testing.assert_allclose(surface.reflectance * surface.opacity, (0.99 * 0.2, 0.5, 0.5), rtol=1e-6)
+    assert one_says(messages(surface), "Sum", "clamped", "passes (0.8, 0.4, 0.1)")
+
+
 def test_glass_mixed_with_transparent_passes_the_mean() -> None:
     material = shader_material("Pane", "ShaderNodeMixShader")
     tree = material.node_tree

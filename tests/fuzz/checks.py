@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -29,8 +30,10 @@ OVERSHOOT = 1.05
 """A texel is interpolated between gather points, and a seam's are stitched."""
 
 
-def check(seed: int) -> bool:
+def check(seed: int, /, **changed: Any) -> bool:
     """Build, bake, look at, and restore the scene of a seed; returns whether it could be baked.
+
+    changed: Settings that are not those of the seed.
 
     Raises
     ------
@@ -38,7 +41,7 @@ def check(seed: int) -> bool:
         If what must hold does not.
     """
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    settings = build(seed)
+    settings = replace(build(seed), **changed)
     before = dump_file()
     seen: list[tuple[BakeScene, BakeResult]] = []
     try:

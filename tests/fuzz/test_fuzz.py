@@ -28,6 +28,10 @@ FIRST = 40
 BAKED_SEED = 17
 """Its scene can be baked."""
 
+BRIGHT_SEED = 50
+BRIGHT_VARIANTS: tuple[dict[str, int], ...] = ({"seed": 4}, {"padding": 6}, {"resolution": 50})
+"""Settings with which light grew from sweep to sweep in the scene of this seed."""
+
 LAYERED = (20017,)
 """Seeds whose faces lie in one another and once made light."""
 
@@ -76,6 +80,16 @@ def test_layers_make_no_light(seed: int) -> None:
     command = [sys.executable, "-m", "tests.fuzz", "--seeds", f"{seed}:{seed + 1}"]
     done = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=TIMEOUT, check=False)
     assert done.returncode == 0, (done.stdout + done.stderr)[-3000:]
+
+
+@pytest.mark.parametrize("changed", BRIGHT_VARIANTS, ids=str)
+def test_no_texel_runs_away_between_paint_and_glass(changed: dict[str, int]) -> None:
+    """Paint that is added to colored transparency once reflected what passed as well."""
+    radiosity_addon.register()
+    try:
+        assert check(BRIGHT_SEED, **changed)
+    finally:
+        radiosity_addon.unregister()
 
 
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

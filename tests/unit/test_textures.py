@@ -21,6 +21,24 @@ def noise(height, width, seed=0):
     return np.random.default_rng(seed).random((height, width, 7)) * 0.9
 
 
+def test_no_channel_reflects_and_passes_more_than_arrives():
+    chance = np.random.default_rng(2)
+    passes = chance.random((8, 8, 3))
+    values = np.ones((8, 8, 7))
+    values[..., :3] = chance.random((8, 8, 3))
+    values[..., 6] = 1 - passes.mean(axis=2)
+    uv, all_ = np.array((LOWER, UPPER), dtype=float), np.ones(2, bool)
+    images = SurfaceImages(values, uv, all_, passes, all_)
+    left = MAX_REFLECTANCE * (1 - passes) / values[..., 6:]
+    np.testing.assert_allclose(images.values[..., :3], np.minimum(values[..., :3], left), rtol=1e-5)
+    assert (values[..., :3] > left).any(axis=(0, 1)).all()
+    # Interpolated as well.
+    points = chance.dirichlet((1, 1, 1), 200)[:, 1:]
+    rows = np.zeros(200, int)
+    lost = 1 - images.at(rows, points)[:, :3] - images.passes_at(rows, points)
+    assert (lost > -1e-6).all()
+
+
 def test_texel_centers_hold_their_own_values():
     values = noise(4, 8)
     images = images_of(values)

@@ -10,6 +10,7 @@ import numpy as np
 from ...scene import Faces
 from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport
+from ...solver.gather import MOST_TINT
 from ...solver.hierarchy import LEAF, Clusters, Hierarchy
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
@@ -17,9 +18,6 @@ from ...solver.settings import SolverSettings
 from .value_checks import LARGE, SHARE_TOLERANCE, instance, integers, number, numbers, require, whole
 
 MOST_THREADS, MOST_LEVELS = 4096, 64
-
-MOST_TINT = 64.0
-"""Tints are relative to means, and to the chance that rays pass: a few times 1, at many crossings more."""
 
 MOST_FACTOR = 1e3
 """Means of samples may exceed what the exact form factor cannot."""

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...base import BakeWarning
-from ...numerics import MAX_REFLECTANCE, radiosity_of_radiance
+from ...numerics import MAX_REFLECTANCE, most_reflectance, radiosity_of_radiance
 from .node_algebra import NodeAlgebra
 from .shader_nodes import (
     MissingImageError,
@@ -99,15 +99,16 @@ def read_material(material: bpy.types.Material | None, lets_through: bool = Fals
     reflectance, radiance, opacity = surface_of_terms(
         terms.reflected[None], terms.radiance[None], terms.passed[None]
     )
+    passed = passing_color(terms.passed, opacity[0]) if reader.is_glass else None
     return Surface(
-        reader.clamped_reflectance(reflectance[0]),
+        reader.clamped_reflectance(reflectance[0], opacity[0], passed),
         radiosity_of_radiance(reader.not_negative("emission", radiance[0])),
         float(opacity[0]),
         tuple(reader.warnings),
         reader.varies,
         tuple(reader.fallbacks),
         reader.is_volume,
-        passing_color(terms.passed, opacity[0]) if reader.is_glass else None,
+        passed,
         reader.is_glass,
     )
 
@@ -279,12 +280,19 @@ class _Reader(ShaderTerms[Stack]):
         self.warn(f"{node.bl_label} is not supported; {what} {_text(np.zeros(3))} is used")
         return nothing()
 
-    def clamped_reflectance(self, reflectance: np.ndarray) -> np.ndarray:
-        """Keep a reflectance where the light in a closed room still dies away."""
-        clamped = np.clip(np.nan_to_num(reflectance), 0.0, MAX_REFLECTANCE)
+    def clamped_reflectance(
+        self, reflectance: np.ndarray, opacity: np.ndarray, passed: np.ndarray | None
+    ) -> np.ndarray:
+        """Keep a reflectance where the light in a closed room still dies away.
+
+        passed (3,): What goes through a surface of this opacity by color; None if that is gray.
+        """
+        most = MAX_REFLECTANCE if passed is None else most_reflectance(opacity, passed)
+        clamped = np.clip(np.nan_to_num(reflectance), 0.0, most)
         # The margin is what single-precision colors round by.
         if (np.abs(clamped - reflectance) > 1e-6).any():
-            self.warn(f"reflectance {_text(reflectance)} is clamped to {_text(clamped)}")
+            why = "" if passed is None else f", for it also passes {_text(passed)}"
+            self.warn(f"reflectance {_text(reflectance)} is clamped to {_text(clamped)}{why}")
         return clamped
 
     def not_negative(self, what: str, values: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from .bright_patches import AimedRays
 from .direct_light import DirectLight, LightQuery
 from .element_cells import ElementCells
 from .element_lookup import ElementLookup
-from .final_gather import GatheredHits
+from .final_gather import MOST_TINT, GatheredHits
 from .footprints import Footprints
 from .gather_rays import Gather
 from .hit_numbers import NOTHING, UNNUMBERED, Resolver, lowest_number, table_end, values_of
@@ -20,6 +20,7 @@ from .residual import Residual
 from .retracing import Before, MovedGeometry
 
 __all__ = [
+    "MOST_TINT",
     "NOTHING",
     "UNNUMBERED",
     "AimedRays",

@@ -30,6 +30,10 @@ PRESSED = 1.5
 against another one: points on it are sunk behind it (`lightmap/texels/texel_geometry.py`), because nothing
 reaches them, however bright the back is where it is open."""
 
+MOST_TINT = float(np.finfo(np.float16).max)
+"""Largest tint that can be kept. Tints are relative to the chance that rays pass: at each surface that is
+paint and glass at once a channel may have three times as much."""
+
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
 
@@ -297,7 +301,7 @@ def tints_of(hits: Hits) -> Array:
     """Return (n, 3) float16 the tints of hits; ones if they have none."""
     if hits.tint is None:
         return np.ones((len(hits.triangle), 3), dtype=np.float16)
-    return np.asarray(hits.tint.astype(np.float16))
+    return np.asarray(np.minimum(hits.tint, MOST_TINT).astype(np.float16))
 
 
 def _trace(
