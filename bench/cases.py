@@ -15,7 +15,9 @@ from radiosity_addon.options.bake_settings import BakeSettings
 ROOT = Path(__file__).resolve().parents[1]
 SHARED_SCENES = ROOT.parent / "shared" / "scenes"
 
-QUALITIES: tuple[dict[str, Any], ...] = ({"quality": "draft"}, {"quality": "medium"}, {"quality": "high"})
+QUALITIES: tuple[dict[str, Any], ...] = tuple(
+    {"quality": quality} for quality in ("sketch", "draft", "medium", "high")
+)
 
 ERROR_SETTING = next(
     (n for n in ("target_error", "relative_error") if n in BakeSettings.__annotations__), None
@@ -153,7 +155,7 @@ _SMALL: dict[str, Any] = {"runs": _FEW_LINKS, "minutes": 6.0}
 SMALL_CASES = {
     case.name: case
     for case in (
-        Case("cornell", "Cornell box", "cornell", 48, (2, 8, 32), 64, runs=QUALITIES[:2], minutes=6.0),
+        Case("cornell", "Cornell box", "cornell", 48, (2, 8, 32), 64, runs=QUALITIES[1:3], minutes=6.0),
         Case("interior", "Office", "interior", 64, (1, 2, 4), 16, parameters={"detail": 0.1}, **_SMALL),
         _file("boxes", "Abutting boxes (Godot tests)", "godot-tests/test01/boxes.blend",
               lamp=_BOXES_LAMP, resolution=48, samples=(1, 4, 16), reference_samples=64, **_SMALL),

@@ -37,7 +37,7 @@ class Bench:
     small : bool
     threads : int
     presets : bool
-        Draft, medium and high alone, no target errors.
+        The qualities alone, no target errors.
     """
 
     cache: Path
@@ -192,12 +192,13 @@ def denoise(bench: Bench, prepared: Prepared, noisy: dict[str, Any], pixels: Pat
     with np.load(target) as pages:
         judged = {name: prepared.judged(pages[name]) for name in pages.files}
     best = min(judged, key=lambda name: judged[name]["error"])
-    alone = found["filters"][best]["seconds"]
+    alone = found["filters"][best]
     entry = {
         "samples": samples,
         "filter": best,
-        "seconds": noisy["seconds"] + alone,
-        "denoiser_seconds": alone,
+        "seconds": noisy["seconds"] + alone["seconds"],
+        "cpu_seconds": noisy["cpu_seconds"] + alone["cpu_seconds"],
+        "denoiser_seconds": alone["seconds"],
         "memory_MB": max(noisy["memory_MB"], found["memory_MB"]),
         "errors_of_filters": {name: figures["error"] for name, figures in judged.items()},
         **judged[best],
@@ -221,18 +222,12 @@ def conclusions(found: dict[str, Any], targets: tuple[float, ...]) -> dict[str, 
             row[who] = _reading(reading)
             row[f"ratio_to_{who}"] = curves.ratio(reading, our_time)
         at_targets.append(row)
-    at_ours = []
-    for entry in presets:
-        mine = curves.Reading(entry["seconds"], "measured")
-        error = max(entry["error"], 1e-6)
-        row = {"label": entry["label"], "error": entry["error"], "seconds": entry["seconds"]}
-        for who, reading in (
-            ("cycles", curves.time_of_sampling(cycles, error)),
-            ("cycles_oidn", curves.time_to_reach(oidn, error)),
-        ):
-            row[who] = _reading(reading)
-            row[f"ratio_to_{who}"] = curves.ratio(reading, mine)
-        at_ours.append(row)
+    at_ours = [
+        {"label": entry["label"], "error": entry["error"]}
+        | _times_at(found, entry, "seconds")
+        | {"processor": _times_at(found, entry, "cpu_seconds")}
+        for entry in presets
+    ]
     order = curves.sampling_order(cycles) if len(cycles) > 1 else None
     asked = [entry for entry in presets if ERROR_SETTING and ERROR_SETTING in entry["settings"]]
     calibration = [
@@ -248,9 +243,22 @@ def conclusions(found: dict[str, Any], targets: tuple[float, ...]) -> dict[str, 
     }
 
 
-def _points(entries: list[dict[str, Any]]) -> list[curves.Point]:
+def _times_at(found: dict[str, Any], entry: dict[str, Any], clock: str) -> dict[str, Any]:
+    """Return what the others take, by a clock, to the error of one of our bakes."""
+    mine, error = curves.Reading(entry[clock], "measured"), max(entry["error"], 1e-6)
+    times: dict[str, Any] = {"seconds": entry[clock]}
+    for who, reading in (
+        ("cycles", curves.time_of_sampling(_points(found["cycles"], clock), error)),
+        ("cycles_oidn", curves.time_to_reach(_points(found["cycles_oidn"], clock), error)),
+    ):
+        times[who] = _reading(reading)
+        times[f"ratio_to_{who}"] = curves.ratio(reading, mine)
+    return times
+
+
+def _points(entries: list[dict[str, Any]], clock: str = "seconds") -> list[curves.Point]:
     return [
-        curves.Point(entry["seconds"], max(entry["error"], 1e-6), entry.get("samples"))
+        curves.Point(entry[clock], max(entry["error"], 1e-6), entry.get("samples"))
         for entry in entries
         if "error" in entry
     ]

@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Point:
-    """A measured bake: wall-clock time [s], relative error, and samples where those are what costs."""
+    """A measured bake: time [s], relative error, and samples where those are what costs."""
 
     seconds: float
     error: float

@@ -57,7 +57,7 @@ def table(folder: Path) -> str:
     """Return the results of a folder as Markdown tables."""
     found = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
     compared = [results for results in found if "at_equal_error" in results]
-    parts = [_compared_table(compared)] if compared else []
+    parts = [_compared_table(compared), _qualities_table(compared)] if compared else []
     parts += [_rooms_table(results) for results in found if "rooms" in results]
     return "\n\n".join(parts) if parts else "No results yet: `python3 build.py bench` makes them."
 
@@ -79,6 +79,28 @@ def _compared_table(compared: list[dict[str, Any]]) -> str:
             scene = ""
     notes = sorted({_where(results) for results in compared})
     return "\n".join([*lines, "", "\\* extrapolated by samples^(-1/2). " + " ".join(notes)])
+
+
+def _qualities_table(compared: list[dict[str, Any]]) -> str:
+    """Return each quality's error and processor time, and what the others take to the same error."""
+    lines = [
+        "| scene | quality | error | without the worst 1 % | processor time | Cycles | Cycles + OIDN |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for results in sorted(compared, key=lambda r: (r["case"] not in ("cornell", "interior"), r["case"])):
+        scene, bakes = results["title"], {entry["label"]: entry for entry in results["ours"]}
+        for row in results["at_our_errors"]:
+            times, error = row.get("processor"), bakes[row["label"]]
+            if times is None or "quality" not in error["settings"]:
+                continue
+            oidn = times["ratio_to_cycles_oidn"]
+            lines.append(
+                f"| {scene} | {row['label']} | {row['error']:.1%} | {error['without_worst_1']:.1%} | "
+                f"{_time({'seconds': times['seconds'], 'kind': 'measured'})} | "
+                f"{_times(times['ratio_to_cycles'])} | {'not reached' if oidn is None else _times(oidn)} |"
+            )
+            scene = ""
+    return "\n".join(lines)
 
 
 def _rooms_table(results: dict[str, Any]) -> str:
