@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..numerics import irradiance_under_sky, pick_in_runs, running_sums
+from ..numerics import irradiance_under_sky, numbered, pick_in_runs, running_sums
 from .light import Float64Array, Lamp, Light, Rays, Samples, row_cosines
 from .sun_and_sky import EnvironmentLight
 
@@ -127,8 +127,14 @@ class SkyPatch(Lamp):
         total = np.where(rise > 0.0, normals @ self._mean, 0.0)
         cut = np.flatnonzero(np.abs(rise) < self._sine)
         if len(cut):
-            distinct, where = np.unique(normals[cut], axis=0, return_inverse=True)
-            total[cut] = self._cut_by_horizon(distinct)[where.reshape(-1)]
+            # Neighbors on a flat surface have one normal: few are left to sort.
+            asked = normals[cut]
+            begins = np.append(True, (asked[1:] != asked[:-1]).any(axis=1))
+            runs = asked[begins]
+            number = numbered(runs)
+            distinct = np.empty((int(number.max()) + 1, 3))
+            distinct[number] = runs
+            total[cut] = self._cut_by_horizon(distinct)[number][np.cumsum(begins) - 1]
         return total
 
     def _cut_by_horizon(self, normals: Float64Array) -> Float64Array:
