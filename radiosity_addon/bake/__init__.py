@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .bake_warnings import coincident_counts, of_coincident
 from .estimate import Estimate, LightmappedObject, estimate_bake
-from .importance import thinned_out
+from .importance import may_thin_out, thinned_out
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .scene_memory import refuse_many_triangles
@@ -27,6 +27,7 @@ __all__ = [
     "can_keep",
     "coincident_counts",
     "estimate_bake",
+    "may_thin_out",
     "of_coincident",
     "of_inside_out",
     "pages_of",

@@ -51,5 +51,5 @@ def refuse_many_triangles(triangles: int, faces: int, settings: BakeSettings, te
     raise UsageError(
         f"{triangles:,} triangles with {faces:,} lit sides need about {(needed + taken) / 2**30:.1f} GiB, "
         f"{taken / 2**30:.1f} of them taken now, but the memory limit is {limit / 2**30:g} GiB: "
-        f"raise the limit to {raised:.1f}, or bake fewer objects"
+        f"raise the limit to {raised:.1f}, or set objects to Ignore"
     )

@@ -24,7 +24,7 @@ from ..scene import BakeObject, BakeScene, Scene, inside_out
 from ..solver import Solution
 from ..solver.gather import Footprints, LocalPass
 
-DARK = 0.02
+DARK = 0.05
 """A front that gets less than this part of its back's light, and of usual light, is dark, …"""
 
 SEEN = 0.1

@@ -164,4 +164,6 @@ def _of_glass(objects: Sequence[str], power: dict[str, float] | None) -> str:
     if power is None:
         return passes
     taken = power.get("absorbed_by_glass", 0.0) / max(power["emitted"], 1e-300)
+    if taken < 5e-4:
+        return passes
     return f"{passes}, which {'takes' if len(objects) == 1 else 'take'} {taken:.1%} of all light"

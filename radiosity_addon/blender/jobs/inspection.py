@@ -20,6 +20,7 @@ from ...bake import (
     Estimate,
     LightmappedObject,
     estimate_bake,
+    may_thin_out,
     process_bytes,
     refuse_large_pages,
     refuse_many_triangles,
@@ -167,7 +168,7 @@ def inspect(
         *_of_glass(collected),
         *_of_visibility(context),
         *_of_layers(chosen, settings),
-        *_of_texels(lit, plan),
+        *_of_texels(lit, plan, settings),
         *_of_scales(collected),
         *_of_size(shapes),
         *(Finding(WARNING, warning.name, warning.message) for warning in inside_out_warnings(shown)),
@@ -279,7 +280,7 @@ def _of_layers(chosen: Sequence[Piece], settings: BakeSettings) -> Iterator[Find
             yield Finding(WARNING, new[0], message)
 
 
-def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Finding]:
+def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
     """Name objects that get hardly any texels, and one that gets nearly all."""
     tiny = [
         item.name
@@ -287,12 +288,13 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
         if item.area > 0 and texels < TINY_TEXELS
     ]
     names = [item.name for item in lit]
-    greedy = greedy_object(names, plan.texels)
+    # Where the density is given, nobody takes texels from others.
+    greedy = greedy_object(names, plan.texels) if may_thin_out(settings) else None
     for warning in thinned_out(names, plan.thinned, plan.texels):
         yield Finding(WARNING, warning.name, warning.message)
     if tiny:
         advice = (
-            "raise the resolution or the texel scale"
+            "raise the resolution, the texel density or the texel scale"
             if greedy is None
             else f"'{greedy}' takes nearly all of them"
         )

@@ -59,7 +59,7 @@ def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     """
     faces = lit_sides(scene)
     what = f"the hierarchical method with {faces:,} faces"
-    advice = "raise the limit, or bake fewer objects"
+    advice = "raise the limit, or leave objects out of the scene"
     refuse_beyond(settings.memory_limit, least_bytes(faces, settings), what, advice)
 
 
