@@ -69,7 +69,8 @@ def _compared_table(compared: list[dict[str, Any]]) -> str:
     ]
     for results in sorted(compared, key=lambda r: (r["case"] not in ("cornell", "interior"), r["case"])):
         scene = f"{results['title']}, {results['triangles']:,} triangles, {results['resolution']}²"
-        for row in results["at_equal_error"]:
+        rows = results["at_equal_error"]
+        for row in [row for row in rows if row["ours"]] or rows[:1]:
             oidn = _time(row["cycles_oidn"]) if row["cycles_oidn"] else "not reached"
             lines.append(
                 f"| {scene} | {row['error']:.0%} | {_time(row['ours']) if row['ours'] else _best(results)} | "

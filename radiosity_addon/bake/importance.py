@@ -133,8 +133,8 @@ def thinned_out(names: Sequence[str], scales: Sequence[float], texels: Sequence[
         BakeWarning(
             name,
             f"object '{name}' reaches far beyond the others and would take most texels: it gets a Texel "
-            f"Scale of {scale:.2g} and about {own / total:.0%} of the texels. Cut it into pieces if it is also "
-            "seen from near; a Texel Scale other than 1, or a texel density, overrides this",
+            f"Scale of {scale:.2g} and about {own / total:.0%} of the texels. Cut it into pieces if it is "
+            "also seen from near; a Texel Scale other than 1, or a texel density, overrides this",
         )
         for name, scale, own in zip(names, scales, texels, strict=True)
         if scale < 1.0

@@ -38,7 +38,7 @@ from ...solver.links import ClusterLinks, LightLinks, Links, no_links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
 from ..relight import DAMAGED, KeptBake, damaged
-from ..result import BakedObject, BakeResult, object_density, share_of_page
+from ..result import BakedObject, BakeResult
 from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .plain_objects import flatten, restore
@@ -114,13 +114,7 @@ class StoredBake:
         geometry, report = self._stored["geometry"], self._stored["report"]
         baked = [item for item in bake_scene.objects if item.bake and item.count]
         objects = tuple(
-            BakedObject(
-                item,
-                geometry.uv[item.rows],
-                page,
-                object_density(geometry, item),
-                share_of_page(geometry, item, page),
-            )
+            BakedObject(item, geometry.uv[item.rows], page)
             for item, page in zip(baked, self._stored["pages"], strict=True)
         )
         return BakeResult(pages, objects, report["solver"], bake_scene.warnings, {}, report["atlas"])
