@@ -100,7 +100,7 @@ class BackProbe:
 def turned_away(
     objects: Iterable[BakeObject], areas: Array, front: Array, back: Array, probe: BackProbe
 ) -> Iterator[BakeWarning]:
-    """Yield a warning for each object with a large area lit from behind.
+    """Yield a warning for each object with a large area lit from behind, the largest first.
 
     objects: Those that get lightmaps.
     areas (t,) [m²].
@@ -112,6 +112,7 @@ def turned_away(
     # A median over objects: a ground in the sun is a hundred times as bright and large as a room.
     usual = float(np.quantile(levels, 0.5, method="higher")) if levels else 0.0
     dark = (front < DARK * np.minimum(back, usual)) & (back > SEEN * usual)
+    found: list[tuple[float, BakeWarning]] = []
     for item, area in of:
         suspects = item.first + np.flatnonzero(dark[item.rows])
         share = float(areas[suspects].sum() / area.sum())
@@ -122,12 +123,14 @@ def turned_away(
         distinct, count = np.unique(np.minimum(chosen, len(suspects) - 1), return_counts=True)
         share *= float(count @ probe.lit(suspects[distinct], SEEN * usual)) / PROBED
         if share > MAX_TURNED_SHARE:
-            yield BakeWarning(
-                item.name,
+            message = (
                 f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
                 "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
-                "that side should be visible",
+                "that side should be visible"
             )
+            found.append((share * float(area.sum()), BakeWarning(item.name, message)))
+    for _, warning in sorted(found, key=lambda each: -each[0]):
+        yield warning
 
 
 def front_irradiance(
