@@ -7,6 +7,8 @@ import math
 import bpy
 import numpy as np
 
+from tests.app.conftest import painted
+
 
 def build_trees(count: int) -> None:
     """Add a ground with trees of two materials, turned and scaled, a lamp and a camera."""
@@ -15,8 +17,8 @@ def build_trees(count: int) -> None:
     bpy.context.object.name = "Ground"
     bpy.ops.mesh.primitive_cone_add(vertices=6, radius1=0.8, depth=2)
     tree = bpy.context.object
-    tree.data.materials.append(_painted("Leaves", (0.1, 0.5, 0.1, 1)))
-    tree.data.materials.append(_painted("Bark", (0.3, 0.2, 0.1, 1)))
+    tree.data.materials.append(painted("Leaves", (0.1, 0.5, 0.1, 1)))
+    tree.data.materials.append(painted("Bark", (0.3, 0.2, 0.1, 1)))
     for polygon in tree.data.polygons[:3]:
         polygon.material_index = 1
     rng = np.random.default_rng(4)
@@ -38,12 +40,3 @@ def build_trees(count: int) -> None:
     scene.camera, scene.render.resolution_x, scene.render.resolution_y = camera, 320, 240
     scene.world = bpy.data.worlds.new("Sky")
     scene.world.color = (0.3, 0.4, 0.5)
-
-
-def _painted(name: str, color: tuple[float, ...]) -> bpy.types.Material:
-    material = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = color
-    return material

@@ -6,9 +6,9 @@ answers as the part of it that sees its *anchor*, a point inside. Hits that do n
 are answered by one of the leaf's sixteenths, each again the part that sees its own anchor.
 
 Nor does a leaf look alike all over: next to a wall it is darker than in its middle, and what a panel or a
-picture covers is black, though the gap below it lets lines of sight pass. So no leaf or cell answers that is
-wider than a few texels; and below a hood only a cell below it does, as with texels
-(`lightmap/texels/occlusion.py`).
+picture covers is black, though the gap below it lets lines of sight pass. So what is wider than a few texels
+answers only where no finer cell is seen, or where leaves are cut no further; and below a hood only a cell
+below it does, as with texels (`lightmap/texels/occlusion.py`).
 """
 
 from __future__ import annotations
