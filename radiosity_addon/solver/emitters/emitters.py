@@ -19,7 +19,7 @@ from ...numerics import (
 )
 from ...rays import RayCaster
 from ...scene import Faces
-from .emitter_tree import EmitterTree
+from .emitter_tree import EmitterPairs, EmitterTree
 from .merged_faces import merge_flat
 
 CHUNK_PAIRS = 1 << 18
@@ -228,20 +228,13 @@ class EmitterGroup:
             chosen = np.take_along_axis(factors, face[:, None], axis=1)[:, 0]
             return face, along, chosen / np.maximum(factors.sum(axis=1), 1e-300)
         tree, pairs = self._tree, self._tree.ask(points, normals)
-        count = np.bincount(pairs.row, minlength=len(points))
         face, (along, chance) = np.zeros(len(points), dtype=np.int64), np.zeros((2, len(points)))
-        lit = np.flatnonzero(count)
-        if len(lit):
-            first = run_starts(count)[lit, None]
-            running = running_sums(pairs.factor)
-            which, within = pick_in_runs(running, u[lit, None], first, first + count[lit, None])
-            node, within, below = tree.descend(points[lit], pairs.node[which[:, 0]], within[:, 0])
-            begin, end = tree.begin[node], tree.end[node]
-            slot, within = pick_in_runs(tree.running, within[:, None], begin[:, None], end[:, None])
-            total = np.bincount(pairs.row, pairs.factor, len(points))[lit]
-            part = np.diff(tree.running)[slot[:, 0]] / (tree.running[end] - tree.running[begin])
-            chance[lit] = pairs.factor[which[:, 0]] / total * below * part
-            face[lit], along[lit] = tree.order[slot[:, 0]], within[:, 0]
+        lit, *picked = _pick_by_tree(tree, pairs, points, u[:, None])
+        which, node, slot, within, below = (part[:, 0] for part in picked)
+        total = np.bincount(pairs.row, pairs.factor, len(points))[lit]
+        part = np.diff(tree.running)[slot] / (tree.running[tree.end[node]] - tree.running[tree.begin[node]])
+        chance[lit] = pairs.factor[which] / total * below * part
+        face[lit], along[lit] = tree.order[slot], within
         return face, along, chance
 
     def _rays_by_tree(
@@ -249,26 +242,16 @@ class EmitterGroup:
     ) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at nodes by what they send, and at faces of a node by their weights."""
         pairs = tree.ask(points, normals)
-        count = np.bincount(pairs.row, minlength=len(points))
-        lit = np.flatnonzero(count)
         directions, (distances, weights) = np.zeros((*u.shape[:2], 3)), np.zeros((2, *u.shape[:2]))
         directions[..., 2] = 1.0
-        if len(lit) == 0:
-            return directions, distances, weights
-        first = run_starts(count)[lit, None]
-        running = running_sums(pairs.factor)
-        which, along = pick_in_runs(running, u[lit, :, 0], first, first + count[lit, None])
-        toward = np.repeat(points[lit], u.shape[1], axis=0)
-        node, along, chance = tree.descend(toward, pairs.node[which].ravel(), along.ravel())
-        node, along, chance = (each.reshape(which.shape) for each in (node, along, chance))
-        begin, end = tree.begin[node], tree.end[node]
-        slot, along = pick_in_runs(tree.running, along, begin, end)
+        lit, which, node, slot, along, chance = _pick_by_tree(tree, pairs, points, u[..., 0])
         inside = np.stack([along, u[lit, :, 1]], axis=-1)
         directions[lit], distances[lit], thrown = self._rays_to(
             points[lit], normals[lit], tree.order[slot], inside
         )
         # A point of a node's faces stands for what the whole node would send, were it all there.
-        sent = radiance_of_radiosity(thrown * (tree.running[end] - tree.running[begin]) / chance)
+        held = tree.running[tree.end[node]] - tree.running[tree.begin[node]]
+        sent = radiance_of_radiosity(thrown * held / chance)
         weights[lit] = _balanced(sent / np.maximum(pairs.factor[which], 1e-300), which, len(pairs.row))
         return directions, distances, weights
 
@@ -334,6 +317,28 @@ class EmitterGroup:
         # Among the faces may be the back of the one the point is on.
         factors[seen] = point_to_polygon(points[point], normals[point], self._corners[face], contact=False)
         return factors
+
+
+def _pick_by_tree(
+    tree: EmitterTree, pairs: EmitterPairs, points: Array, u: Array
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Choose nodes for points by what they send, and faces of the nodes by their weights, by (n, k) numbers.
+
+    Returns lit (l,) the points that get light, and (l, k) each: the pair, the node below it, the place of the
+        face in the tree's order, what is left of the number, and the probability of that node below it.
+    """
+    count = np.bincount(pairs.row, minlength=len(points))
+    lit = np.flatnonzero(count)
+    if len(lit) == 0:
+        none = np.zeros((0, u.shape[1]), dtype=np.int64)
+        return lit, none, none, none, none.astype(float), none + 1.0
+    first = run_starts(count)[lit, None]
+    which, along = pick_in_runs(running_sums(pairs.factor), u[lit], first, first + count[lit, None])
+    toward = np.repeat(points[lit], u.shape[1], axis=0)
+    found = tree.descend(toward, pairs.node[which].ravel(), along.ravel())
+    node, along, chance = (each.reshape(which.shape) for each in found)
+    slot, along = pick_in_runs(tree.running, along, tree.begin[node], tree.end[node])
+    return lit, which, node, slot, along, chance
 
 
 def _uncovered(faces: Faces, rows: Array) -> tuple[Array, Array, Array]:
