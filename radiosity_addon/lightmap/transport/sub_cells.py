@@ -205,11 +205,11 @@ class _SubCellGather:
             for own, (_, rays) in enumerate(RAYS_OF_MET)
         ]
         for (of_element, rays, cells), part in progress.each(groups):
-            if len(cells) == 0:
-                continue
-            gathered = self._table.gather(cells, of_element, min(rays, self._most_rays), part)
-            self.count(gathered.sources)
-            self._found.append(SubCellHits(of_element, cells, gathered.sources, tints=gathered.tints))
+            for tile, of_tile in part.each(list(tiles(len(cells)))):
+                chosen = cells[tile]
+                gathered = self._table.gather(chosen, of_element, min(rays, self._most_rays), of_tile)
+                self.count(gathered.sources)
+                self._found.append(SubCellHits(of_element, chosen, gathered.sources, tints=gathered.tints))
         return len(new) > 0
 
     def small(self) -> Array:
@@ -224,21 +224,33 @@ class _SubCellGather:
 
     def links(self, rows: TableRows, reflectance: Array, progress: Progress) -> list[SubCellLinks]:
         """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""
-        table, direct = self._table, self._table.local.direct
+        table = self._table
         gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any())]
         gathered += SubCellHits.joined(self._found)
+        # Both are copies: of what was found, and of what stays.
+        self._found = []
         made = []
         for hits, part in progress.each(gathered):
             if hits.gains is None:
-                gains = direct.new_gains(len(hits.number))
-                at = table.lit_footprints(hits.number, hits.of_element)
-                lamps = direct.at(at, hits.shadow_rays, gains, progress=part)
+                gains, lamps = self._lit(hits, part)
             else:
-                gains, lamps = hits.gains, direct.lit_by(hits.gains)
+                gains, lamps = hits.gains, table.local.direct.lit_by(hits.gains)
             of_cells = table.reflectance(hits.number, hits.of_element, reflectance)
-            sources = rows.rows(hits.sources)
-            made.append(SubCellLinks(rows.rows(hits.number), sources, of_cells, lamps, gains, hits.tints))
+            rows.to_rows(hits.sources)
+            made.append(SubCellLinks(rows.rows(hits.number), hits.sources, of_cells, lamps, gains, hits.tints))
         return made
+
+    def _lit(self, hits: SubCellHits, progress: Progress) -> tuple[LightGains | None, Array]:
+        """Return what each light adds to cells, if it is kept, and (p, 3) what all add [W/m²]."""
+        direct, lamps = self._table.local.direct, np.empty((len(hits.number), 3))
+        kept = []
+        for tile, part in progress.each(list(tiles(len(lamps)))):
+            gains = direct.new_gains(len(lamps[tile]))
+            at = self._table.lit_footprints(hits.number[tile], hits.of_element)
+            lamps[tile] = direct.at(at, hits.shadow_rays, gains, progress=part)
+            if gains is not None:
+                kept.append(gains)
+        return LightGains.joined(kept) if kept else None, lamps
 
 
 class SubCellSweeps:

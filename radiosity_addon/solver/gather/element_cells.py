@@ -41,7 +41,10 @@ ANCHOR = np.array([0.3595, 0.3218, 0.3187])
 _CHILDREN = split_in_four(np.eye(3)[None])[0]
 """(4, 3, 3) weights of a triangle's corners at those of its four children."""
 
-_ANCHORS = ANCHOR @ split_in_sixteen(np.eye(3)[None])[0]
+_SIXTEENTHS = split_in_sixteen(np.eye(3)[None])[0]
+"""(16, 3, 3) weights of a triangle's corners at those of its sixteenths."""
+
+_ANCHORS = ANCHOR @ _SIXTEENTHS
 """(16, 3) weights of a triangle's corners at the anchors of its sixteenths."""
 
 STARTS = 16
@@ -198,7 +201,7 @@ class ElementCells:
             path = number[rows] - _STARTS[level - 1]
             for step in range(level - 1, -1, -1):
                 digit = path // CELLS_PER_ELEMENT**step % CELLS_PER_ELEMENT
-                corners[rows] = split_in_sixteen(corners[rows])[np.arange(len(rows)), digit]
+                corners[rows] = _SIXTEENTHS[digit] @ corners[rows]
         return np.asarray(corners)
 
     def _positions(self, hits: Hits) -> Array:
