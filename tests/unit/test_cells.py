@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.texels.cells import ALONG, CELLS_PER_TEXEL, TexelCells
+from radiosity_addon.lightmap.texels.cells import ALONG, CELLS_PER_TEXEL, OWN, TexelCells
 from radiosity_addon.lightmap.texels.occlusion import find_crossings
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.caster import Hits
@@ -78,17 +78,49 @@ def test_samples_of_a_cell_stay_on_its_anchors_side() -> None:
     assert (side[:, None] * (points[..., 0] * SIZE - at) > 0).all()
 
 
-def test_cells_of_a_texel_tile_it() -> None:
+@pytest.mark.parametrize("first", [0, OWN], ids=["own", "of the pixel"])
+def test_cells_of_a_texel_tile_it(first: int) -> None:
     """Without the wall's shade their samples have the texel's mean, and each its own sixteenth."""
     cells, geometry = cells_of(wall(5.4))
     whole = np.flatnonzero(geometry.whole[cells.texel])[0]
-    mine = CELLS_PER_TEXEL * whole + np.arange(CELLS_PER_TEXEL)
+    mine = CELLS_PER_TEXEL * whole + first + np.arange(OWN)
     texel = cells.texel[whole]
     anchors = cells.footprints(mine).points[:, :2] * SIZE
     place = anchors - np.stack([geometry.column[texel], geometry.row[texel]])
-    assert len(np.unique(np.floor(place * ALONG), axis=0)) == CELLS_PER_TEXEL
+    assert len(np.unique(np.floor(place * ALONG), axis=0)) == OWN
     assert (np.floor(place * ALONG) >= 0).all()
     assert (np.floor(place * ALONG) < ALONG).all()
+
+
+def test_cells_of_the_pixel_answer_hits_beyond_the_texels_triangle() -> None:
+    """A pixel on the floor's diagonal shows one of its two triangles; hits on the other one have squares."""
+    at = 5.4
+    cells, geometry = cells_of(wall(at))
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(5.01, 5.99, (2, 400))
+    hits = on_floor(x / SIZE, y / SIZE)
+    texel = geometry.texel_at(hits)
+    foreign = geometry.triangle[texel] != hits.triangle
+    assert 100 < foreign.sum() < 300
+    cell = cells.at(texel, hits)[foreign]
+    assert (cell % CELLS_PER_TEXEL >= OWN).all()
+    apart = cells.footprints(cell).points[:, :2] * SIZE - np.stack([x, y], axis=1)[foreign]
+    assert np.abs(apart).max() < 1.0 / ALONG
+    points = cells.footprints(cell).sampler(np.arange(len(cell)), rng.uniform(size=(len(cell), 8, 2)))
+    apart = points[..., :2] * SIZE - cells.footprints(cell).points[:, None, :2] * SIZE
+    assert np.abs(apart).max() < 1.0 / ALONG
+
+
+def test_texels_below_a_hood_answer_in_cells() -> None:
+    """In a gap light fades within a few heights: the middle of a texel does not stand for its rim."""
+    low = 3.0
+    slab = rectangle((low / SIZE, -1, 0.05 / SIZE), (0, 3, 0), (4 / SIZE, 0, 0))
+    cells, geometry = cells_of(slab)
+    x = np.linspace(4.02, 5.98, 40)
+    hits = on_floor(x / SIZE, np.full(40, 2.3) / SIZE)
+    cell = cells.at(geometry.texel_at(hits), hits)
+    assert (cell != NOTHING).all()
+    assert np.abs(cells.footprints(cell).points[:, 0] * SIZE - x).max() < 1.0 / ALONG
 
 
 def test_light_on_one_side_does_not_reach_the_other() -> None:

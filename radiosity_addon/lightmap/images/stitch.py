@@ -2,9 +2,9 @@
 
 Least squares over the texels that are read along seams: Σ length (a(x) − b(x))² over places x on
 the seams, where a and b are bilinear look-ups on either side, plus Σ λ (v − v₀)² over the texels,
-solved by conjugate gradients. Texels outside the charts, which dilation made up, give way easily;
-those whose center is on the surface hardly. No texel leaves the range of the values that were
-read next to it, so dark texels stay dark, and nothing turns negative.
+solved by conjugate gradients. Places where a and b differ a lot are left out. Texels outside the charts,
+which dilation made up, give way easily; those whose center is on the surface hardly. No texel leaves the
+range of the values that were read next to it, so dark texels stay dark, and nothing turns negative.
 """
 
 from __future__ import annotations
@@ -23,6 +23,10 @@ Float32 = NDArray[np.float32]
 
 HOLD_COVERED, HOLD_EDGE, HOLD_OUTSIDE = 1.0, 0.1, 0.01
 """λ of texels whose center is on the surface, of those of which only a part is, and of dilated ones."""
+
+MOST_STEP = 0.5
+"""Sides that differ by more than this part of their mean are lit differently: the edge of a shadow or of a
+hood lies there, or a strip too narrow to show more than its mean. One value would be wrong on both."""
 
 MAX_ITERATIONS = 40
 """Conjugate-gradient steps at most; …"""
@@ -66,6 +70,7 @@ def stitch(values: Array, hold: Array, seams: Seams) -> Array:
     Returns values (n, k): A new array of the same type; equal bit for bit where no seam is near.
     """
     result = np.array(values)
+    seams = _lit_alike(seams, values)
     if not len(seams):
         return result
     texel, inverse = np.unique(seams.texel, return_inverse=True)
@@ -75,6 +80,13 @@ def stitch(values: Array, hold: Array, seams: Seams) -> Array:
     low, high = _range(system.texel, before)
     result[texel] = np.clip(after, low, high)
     return result
+
+
+def _lit_alike(seams: Seams, values: Array) -> Seams:
+    """Return the places whose two sides are about as bright."""
+    one, other = seams.sides(values).sum(axis=2, dtype=np.float64).T
+    alike = np.abs(one - other) <= 0.5 * MOST_STEP * (one + other)
+    return Seams(seams.texel[alike], seams.weight[alike], seams.length[alike], seams.triangle[alike])
 
 
 class _System:

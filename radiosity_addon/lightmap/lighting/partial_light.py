@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, tiles
 from ...solver.gather import NOTHING, GatheredHits, LocalPass, values_of
 from ..texels import NO_TEXEL, TexelGeometry
 from ..transport import HitTable
 
 EVERY = 4
 """One of this many gather rays is looked up: a picture needs no more, and must cost next to nothing."""
+
+CHUNK = 1 << 14
+"""Gather points whose rays are looked up at once; bounds the temporaries to about 20 MB."""
 
 ALIKE = 0.9
 """Cosine between the normals of a gather point and of a texel it may stand for."""
@@ -138,9 +141,12 @@ class LightSoFar:
 
     def _brought(self, gathered: GatheredHits) -> Array:
         """Return (g, 3) what rays brought by the hierarchy's light [W/m²]."""
-        seen = self._values_at(gathered.sources[:, ::EVERY])
-        mean = (seen if gathered.tints is None else seen * gathered.tints[:, ::EVERY]).mean(axis=1)
-        aimed = gathered.aimed
+        mean, aimed = np.empty((len(gathered.sources), 3)), gathered.aimed
+        for rows in tiles(len(mean), CHUNK):
+            seen = self._values_at(gathered.sources[rows, ::EVERY])
+            mean[rows] = (seen if gathered.tints is None else seen * gathered.tints[rows, ::EVERY]).mean(
+                axis=1
+            )
         if len(aimed.row):
             seen = self._values_at(aimed.sources)
             seen[aimed.sources < 0] = 0.0

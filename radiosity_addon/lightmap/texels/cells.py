@@ -7,6 +7,10 @@ frame is darker than what lies a texel farther in the open. So a divided texel a
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`element_cells.py` does the same for elements).
 Through a gap the line of sight is free: what is below a hood asks what is below it, the rest what is not.
+Texels below a hood answer in cells as well, for in a gap light fades within a few heights.
+
+A texel shows one triangle, but its pixel may lie on others too, whose part may be below a hood or behind a
+wall where the texel's is not. Hits there ask cells of the whole pixel.
 """
 
 from __future__ import annotations
@@ -25,7 +29,11 @@ from .texel_geometry import TexelGeometry
 ALONG = 4
 """Cells along a texel's side."""
 
-CELLS_PER_TEXEL = ALONG**2
+OWN = ALONG**2
+"""Cells of the part of a texel on its own triangle: the first ones. …"""
+
+CELLS_PER_TEXEL = 2 * OWN
+"""… As many of its whole pixel follow."""
 
 ANCHOR = np.array([0.54, 0.47])
 """Of a cell. Near the middle, but off it: walls stand on round fractions of a floor."""
@@ -39,27 +47,30 @@ SURFACE_COSINE = 0.9
 CHUNK_TEXELS = 1 << 13
 """Texels divided at once; bounds the temporaries to about 20 MB."""
 
-_FIRST = np.stack(np.divmod(np.arange(CELLS_PER_TEXEL), ALONG)[::-1], axis=1) / ALONG
+_FIRST = np.stack(np.divmod(np.arange(OWN), ALONG)[::-1], axis=1) / ALONG
 """(16, 2): the corner of every cell next to the texel's own first one, in the texel's unit square."""
+
+_SPOTS = _FIRST + ANCHOR / ALONG
+"""(16, 2): the anchors of cells there."""
 
 
 class TexelCells:
     """The cells of some texels, numbered texel by texel.
 
-    crossings: Those have cells that are crossed or touched.
+    crossings: Those have cells that are crossed, touched or occluded.
     """
 
     def __init__(self, elements: ElementLookup, geometry: TexelGeometry, crossings: Crossings) -> None:
         self.elements, self._geometry = elements, geometry
-        self._rim, divided = crossings.rim, crossings.crossed | crossings.touched
+        self._rim, divided = crossings.rim, crossings.alone | crossings.touched
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
         self._divided = divided
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
-        self._anchors = geometry.scratch.empty((len(self.texel), CELLS_PER_TEXEL, 3))
+        self._own_anchors = geometry.scratch.empty((len(self.texel), OWN, 3))
         self._below = np.zeros((len(self.texel), CELLS_PER_TEXEL), dtype=bool)
         place = partial(_anchors, geometry, elements.caster, self._rim, self.texel)
-        into = (self._anchors, self._below)
+        into = (self._own_anchors, self._below)
         fill_chunks(place, into, len(self.texel), CHUNK_TEXELS, elements.threads)
 
     def __len__(self) -> int:
@@ -85,19 +96,23 @@ class TexelCells:
         waiting = np.flatnonzero(alike)
         position = geometry.positions_of(hits) + self._lift(texel)
         rank = self._rank[texel]
-        order = np.zeros((len(texel), CELLS_PER_TEXEL), dtype=np.int8)
-        apart = self._anchors[rank[waiting]] - position[waiting, None]
+        foreign = (hits.triangle != geometry.triangle[texel]) & ~geometry.is_shared(texel)
+        anchors, first = self._own_anchors[rank], np.where(foreign, OWN, 0)
+        anchors[foreign] = _pixel_anchors(geometry, caster, texel[foreign])
+        order = np.zeros((len(texel), OWN), dtype=np.int8)
+        apart = anchors[waiting] - position[waiting, None]
         order[waiting] = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
         below = self._below_hood(texel, geometry.positions_of(hits)[:, None])[:, 0]
-        for turn in range(CELLS_PER_TEXEL):
+        for turn in range(OWN):
             if len(waiting) == 0:
                 break
             cell = order[waiting, turn]
-            seen = self._below[rank[waiting], cell] == below[waiting]
+            seen = self._below[rank[waiting], first[waiting] + cell] == below[waiting]
             alike = np.flatnonzero(seen)
             asking = waiting[alike]
-            seen[alike] = free_segment(caster, position[asking], self._anchors[rank[asking], cell[alike]])
-            found[waiting[seen]] = CELLS_PER_TEXEL * rank[waiting[seen]] + cell[seen]
+            seen[alike] = free_segment(caster, position[asking], anchors[asking, cell[alike]])
+            number = CELLS_PER_TEXEL * rank[waiting] + first[waiting] + cell
+            found[waiting[seen]] = number[seen]
             waiting = waiting[~seen]
         return found
 
@@ -105,8 +120,8 @@ class TexelCells:
         """Return cells as footprints: their samples see the anchor."""
         geometry, texel = self._geometry, self.texel_of(cell)
         lift, below = self._lift(texel), self._below[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL]
-        anchor = self._anchors[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL] - lift
-        cells = _ChosenCells(texel, _FIRST[cell % CELLS_PER_TEXEL], anchor, lift, below)
+        anchor, own = self._anchor(cell), cell % CELLS_PER_TEXEL < OWN
+        cells = _ChosenCells(texel, _FIRST[cell % OWN], own, anchor, lift, below)
         sample = partial(_sample, geometry, self.elements.caster, self._rim, cells)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), sample, starts=STARTS)
 
@@ -118,8 +133,16 @@ class TexelCells:
         """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
-        anchor = self._anchors[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL] - self._lift(texel)
-        return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
+        return Footprints(self._anchor(cell), geometry.normal[texel], self._keys(cell), expected=expected)
+
+    def _anchor(self, cell: Array) -> Array:
+        """Return (p, 3) the anchors of cells, not lifted."""
+        anchor = self._own_anchors[cell // CELLS_PER_TEXEL, cell % OWN]
+        others = np.flatnonzero(cell % CELLS_PER_TEXEL >= OWN)
+        texel = self.texel_of(cell[others])
+        spots = _pixel_anchors(self._geometry, self.elements.caster, texel)
+        anchor[others] = spots[np.arange(len(others)), cell[others] % OWN]
+        return np.asarray(anchor - self._lift(self.texel_of(cell)))
 
     def _keys(self, cell: Array) -> Array:
         """Return (p,) int64 sampling keys of cells, which do not depend on other divided texels."""
@@ -134,10 +157,17 @@ class TexelCells:
 
 
 class _ChosenCells(NamedTuple):
-    """Cells: (p,) texels, (p, 2) first corners, (p, 3) anchors and lifts, (p,) whether below a hood."""
+    """Cells of texels.
+
+    first (p, 2): The corner next to the texel's first one, in its unit square.
+    own (p,) bool: Whether it is of the texel's own triangle.
+    anchor, lift (p, 3)
+    below (p,) bool: Whether it is below a hood.
+    """
 
     texel: Array
     first: Array
+    own: Array
     anchor: Array
     lift: Array
     below: Array
@@ -147,8 +177,11 @@ def _sample(
     geometry: TexelGeometry, caster: RayCaster, rim: Array, cells: _ChosenCells, rows: Array, u: Array
 ) -> Array:
     """Return (r, k, 3) points of cells that see the anchor, or the anchor."""
-    texel, first, anchor, lift, below = (column[rows] for column in cells)
-    points = geometry.sample(texel, first[:, None] + u / ALONG, 1.0)
+    texel, first, own_part, anchor, lift, below = (column[rows] for column in cells)
+    spots = first[:, None] + u / ALONG
+    points = np.empty((*spots.shape[:2], 3))
+    points[own_part] = geometry.sample(texel[own_part], spots[own_part], 1.0)
+    points[~own_part] = geometry.in_plane(texel[~own_part], spots[~own_part])
     back = np.broadcast_to(anchor[:, None], points.shape)
     above = lift[:, None]
     seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
@@ -161,12 +194,18 @@ def _sample(
 def _anchors(
     geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, rows: slice
 ) -> tuple[Array, Array]:
-    """Return (r, cells, 3) the anchors of divided texels, and (r, cells) whether they are below a hood."""
+    """Return (r, 16, 3) the lifted anchors of texels' own cells, and (r, 32) which of all are hooded."""
     texel = texel[rows]
-    spots = np.broadcast_to(_FIRST + ANCHOR / ALONG, (len(texel), CELLS_PER_TEXEL, 2))
+    spots = np.broadcast_to(_SPOTS, (len(texel), OWN, 2))
     spread = geometry.sample(texel, spots, 1.0)
-    below = _below_rim(geometry, caster, rim, texel, spread)
-    return spread + _lifted(geometry, caster, texel)[:, None], below
+    both = np.concatenate([spread, geometry.in_plane(texel, spots)], axis=1)
+    return spread + _lifted(geometry, caster, texel)[:, None], _below_rim(geometry, caster, rim, texel, both)
+
+
+def _pixel_anchors(geometry: TexelGeometry, caster: RayCaster, texel: Array) -> Array:
+    """Return (r, 16, 3) the lifted anchors of the cells of whole pixels."""
+    spots = np.broadcast_to(_SPOTS, (len(texel), OWN, 2))
+    return np.asarray(geometry.in_plane(texel, spots) + _lifted(geometry, caster, texel)[:, None])
 
 
 def _below_rim(geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, points: Array) -> Array:

@@ -200,7 +200,7 @@ class TexelGeometry:
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         shared = self._shared_numbers(rows)
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner & (shared < 0))
-        points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
+        points[plain] = self.in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
         triangle = self.triangle[rows][:, None]
@@ -243,7 +243,7 @@ class TexelGeometry:
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
-        squares = self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+        squares = self.in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
         shared = self._shared_numbers(rows)
         many = np.flatnonzero(shared >= 0)
         if self.shared is not None and len(many):
@@ -254,7 +254,7 @@ class TexelGeometry:
                 squares[many, corner] = self.position[rows[many]] + 2.0 * half * (x * across + y * up)
         return squares
 
-    def _in_plane(self, rows: Array, spots: Array) -> Array:
+    def in_plane(self, rows: Array, spots: Array) -> Array:
         """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
         triangle = self.triangle[rows]
         start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]

@@ -48,7 +48,7 @@ class HitTable:
         geometry, elements = self.geometry, self.local.elements
         texel = geometry.texel_at(hits)
         found = texel.copy()
-        divided = np.flatnonzero((texel != NO_TEXEL) & self.crossings.crossed[texel])
+        divided = np.flatnonzero((texel != NO_TEXEL) & self.crossings.alone[texel])
         # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
         touched = np.flatnonzero((texel != NO_TEXEL) & self.crossings.touched[texel])
         apart = touched[~self._sees_center(texel[touched], hits.take(touched))]

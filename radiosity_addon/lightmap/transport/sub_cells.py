@@ -237,7 +237,9 @@ class _SubCellGather:
                 gains, lamps = hits.gains, table.local.direct.lit_by(hits.gains)
             of_cells = table.reflectance(hits.number, hits.of_element, reflectance)
             rows.to_rows(hits.sources)
-            made.append(SubCellLinks(rows.rows(hits.number), hits.sources, of_cells, lamps, gains, hits.tints))
+            made.append(
+                SubCellLinks(rows.rows(hits.number), hits.sources, of_cells, lamps, gains, hits.tints)
+            )
         return made
 
     def _lit(self, hits: SubCellHits, progress: Progress) -> tuple[LightGains | None, Array]:
