@@ -13,6 +13,7 @@ from radiosity_addon.base.errors import BakeError, SceneError
 from radiosity_addon.blender.datablocks.bake_record import is_baked, shows_lightmap
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import OutputFolder
+from radiosity_addon.blender.images.node_group import GROUP_NAME
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.operators.checks import look
 from radiosity_addon.blender.operators.cleaning import interrupted_folders
@@ -181,18 +182,32 @@ def test_an_edit_of_a_baked_object_is_there_after_the_next_bake(box: bpy.types.S
     assert min(vertex.co.z for vertex in mesh.vertices) == lowest + 1
 
 
-def test_lightmap_only_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
-    def switches() -> set[float]:
-        trees = [material.node_tree for material in bpy.data.materials if "Lightmap" in material.name]
-        groups = [node for tree in trees for node in tree.nodes if node.type == "GROUP"]
-        return {group.inputs["Lightmap Only"].default_value for group in groups}
+def test_what_is_shown_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
+    def shown() -> set[str]:
+        trees = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]
+        results = [node for tree in trees for node in tree.nodes if node.type == "GROUP_OUTPUT"]
+        return {result.inputs[0].links[0].from_node.name for result in results}
 
     bake()
-    assert switches() == {0.0}
+    assert shown() == {"shine"}
+    for chosen in ("matte", "lightmap"):
+        box.radiosity.show = chosen
+        assert shown() == {chosen}
+        bake()
+        assert shown() == {chosen}
+
+
+def test_a_file_of_an_earlier_version_that_shows_the_lightmap_alone_says_so(
+    box: bpy.types.Scene, tmp_path: Path
+) -> None:
     box.radiosity.lightmap_only = True
-    assert switches() == {1.0}
-    bake()
-    assert switches() == {1.0}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    assert bpy.context.scene.radiosity.show == "lightmap"
+    bpy.context.scene.radiosity.show = "matte"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "later.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "later.blend"))
+    assert bpy.context.scene.radiosity.show == "matte"
 
 
 @pytest.mark.parametrize("again", [False, True], ids=["first bake", "over an earlier one"])

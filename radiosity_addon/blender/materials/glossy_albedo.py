@@ -36,11 +36,14 @@ def metal(algebra: NodeAlgebra, base: NodeColor, roughness: Scalar, multiple: bo
     return algebra.add(single, algebra.scale(rest, _grazing(algebra, roughness)))
 
 
-def dielectric(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar) -> Scalar:
+def dielectric(
+    algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, away: Scalar | None = None
+) -> Scalar:
     """Return the albedo of what shines on a matte base.
 
     ior: Index of refraction.
     level: Principled's Specular IOR Level: 0.5 leaves the reflection as the index says.
+    away: One minus the cosine of the angle from which it is seen; None for all directions together.
     """
     calculate = algebra.calculate
     ratio = calculate("DIVIDE", calculate("SUBTRACT", ior, 1.0), calculate("ADD", ior, 1.0))
@@ -48,7 +51,8 @@ def dielectric(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scal
     normal = algebra.saturate(normal)
     share = calculate("DIVIDE", normal, calculate("ADD", normal, _FAINT))
     share = calculate("MULTIPLY", share, algebra.complement(normal))
-    grazing = calculate("MULTIPLY", share, _grazing(algebra, roughness))
+    seen = _GRAZING if away is None else calculate("POWER", away, 5.0)
+    grazing = calculate("MULTIPLY", share, _falling(algebra, roughness, seen, _GRAZING_LOSS))
     total = calculate("ADD", calculate("MULTIPLY", normal, _white(algebra, roughness)), grazing)
     return algebra.saturate(calculate("MULTIPLY", total, _FRESNEL_OVER_SCHLICK))
 
@@ -61,7 +65,7 @@ def _grazing(algebra: NodeAlgebra, roughness: Scalar) -> Scalar:
     return _falling(algebra, roughness, _GRAZING, _GRAZING_LOSS)
 
 
-def _falling(algebra: NodeAlgebra, roughness: Scalar, smooth: float, loss: float) -> Scalar:
+def _falling(algebra: NodeAlgebra, roughness: Scalar, smooth: Scalar, loss: float) -> Scalar:
     """Return smooth / (1 + loss · roughness^3.5)."""
     power = algebra.calculate("POWER", algebra.saturate(roughness), _EXPONENT)
     lost = algebra.calculate("ADD", algebra.calculate("MULTIPLY", power, loss), 1.0)

@@ -89,15 +89,11 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
             bpy.ops.object.mode_set(mode="EDIT")
 
     def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
-        from ..material_copies.lightmap_materials import set_lightmap_only
-
         look_for_interrupted(context)
 
         if in_window:
             show_result(context)
         report = self._report.as_dict()
-        if context.scene.radiosity.lightmap_only:
-            set_lightmap_only(True)
         taken = sum(report["seconds"].values())
         baked = {entry["object"] for entry in report["objects"]}
         glass = sum(name not in baked for name in report["solver"].get("glass", ()))
