@@ -72,9 +72,25 @@ def test_in_even_light_a_baked_material_looks_as_it_does_unbaked(kind: str, tmp_
     """All light is 1, so that Cycles' own render is the albedo seen from above plus emission."""
     add_plane(material={**EVERY, **LAYERED}[kind]())
     set_world(*WHITE)
-    expected = seen_from_above(tmp_path, samples=256).mean(axis=(0, 1))
+    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
     bake_by_hand((WHITE,), show="shine")
-    np.testing.assert_allclose(seen_from_above(tmp_path, samples=256).mean(axis=(0, 1)), expected, rtol=0.02)
+    np.testing.assert_allclose(
+        seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1)), expected, rtol=0.02
+    )
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize("degrees", [45, 60, 75])
+@pytest.mark.parametrize("kind", ["rough", "smooth", "principled", "coat", "metal"])
+def test_in_even_light_it_looks_so_from_the_side(kind: str, degrees: int, tmp_path: Path) -> None:
+    plane = add_plane(material={**EVERY, **LAYERED}[kind]())
+    plane.rotation_euler.x, plane.scale = np.radians(degrees), (9.0, 9.0, 9.0)
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    np.testing.assert_allclose(
+        seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1)), expected, rtol=0.02
+    )
 
 
 @pytest.mark.parametrize("kind", DIFFUSE)

@@ -87,7 +87,7 @@ def _passing(tree: bpy.types.NodeTree, given: bpy.types.bpy_prop_collection) -> 
     largest = tinted.outputs[2]
 
     def reflected(ior: str, level: Scalar, roughness: str) -> Scalar:
-        return glossy_albedo.dielectric(algebra, given[ior], level, given[roughness], away)
+        return glossy_albedo.dielectric_seen(algebra, given[ior], level, given[roughness], away)
 
     def rest(part: NodeColor) -> NodeColor:
         return algebra.add(np.ones(3), algebra.scale(part, -1.0))

@@ -16,6 +16,8 @@ _WHITE_LOSS = 1.375
 """A white microfacet mirror without multiple scattering reflects 1 / (1 + 1.375 r^3.5)."""
 _GRAZING, _GRAZING_LOSS = 0.0446, 15.5
 """What Fresnel adds at grazing angles to one that is black face on, and its loss likewise."""
+_SEEN = ((3.0, 0.42, 7.5), (8.0, 0.58, 200.0))
+"""The same by the viewer's angle: powers of one minus its cosine, their factors if smooth, and losses."""
 _FRESNEL_OVER_SCHLICK = 1.07
 _FAINT = 0.003
 """Where F0 is not much more than this, there is less to add at grazing angles: none at 0."""
@@ -36,25 +38,45 @@ def metal(algebra: NodeAlgebra, base: NodeColor, roughness: Scalar, multiple: bo
     return algebra.add(single, algebra.scale(rest, _grazing(algebra, roughness)))
 
 
-def dielectric(
-    algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, away: Scalar | None = None
-) -> Scalar:
+def dielectric(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar) -> Scalar:
     """Return the albedo of what shines on a matte base.
 
     ior: Index of refraction.
     level: Principled's Specular IOR Level: 0.5 leaves the reflection as the index says.
-    away: One minus the cosine of the angle from which it is seen; None for all directions together.
     """
+    total = _layer(algebra, ior, level, roughness, _grazing(algebra, roughness))
+    return algebra.saturate(algebra.calculate("MULTIPLY", total, _FRESNEL_OVER_SCHLICK))
+
+
+def dielectric_seen(
+    algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, away: Scalar
+) -> Scalar:
+    """Return the share of even light that what shines on a matte base reflects toward a viewer.
+
+    away: One minus the cosine of the viewer's angle.
+    """
+    parts = [
+        _falling(
+            algebra,
+            roughness,
+            algebra.calculate("MULTIPLY", algebra.calculate("POWER", away, power), smooth),
+            loss,
+        )
+        for power, smooth, loss in _SEEN
+    ]
+    return algebra.saturate(_layer(algebra, ior, level, roughness, algebra.calculate("ADD", *parts)))
+
+
+def _layer(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, grazing: Scalar) -> Scalar:
+    """Return what a dielectric reflects; `grazing` is what Fresnel adds to one that is black face on."""
     calculate = algebra.calculate
     ratio = calculate("DIVIDE", calculate("SUBTRACT", ior, 1.0), calculate("ADD", ior, 1.0))
     normal = calculate("MULTIPLY", calculate("MULTIPLY", ratio, ratio), calculate("MULTIPLY", level, 2.0))
     normal = algebra.saturate(normal)
     share = calculate("DIVIDE", normal, calculate("ADD", normal, _FAINT))
     share = calculate("MULTIPLY", share, algebra.complement(normal))
-    seen = _GRAZING if away is None else calculate("POWER", away, 5.0)
-    grazing = calculate("MULTIPLY", share, _falling(algebra, roughness, seen, _GRAZING_LOSS))
-    total = calculate("ADD", calculate("MULTIPLY", normal, _white(algebra, roughness)), grazing)
-    return algebra.saturate(calculate("MULTIPLY", total, _FRESNEL_OVER_SCHLICK))
+    added = calculate("MULTIPLY", share, grazing)
+    return calculate("ADD", calculate("MULTIPLY", normal, _white(algebra, roughness)), added)
 
 
 def _white(algebra: NodeAlgebra, roughness: Scalar) -> Scalar:
