@@ -43,10 +43,17 @@ class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
     )
 
 
+def look_of(scene: bpy.types.Scene) -> str:
+    """Return how a scene shows its lightmaps; one without settings stays without."""
+    default = PANEL_OPTIONS["show"].default
+    return scene.radiosity.show if scene.is_property_set("radiosity") else str(default)
+
+
 def read_earlier(_: object = None) -> None:
     """Take over what the open file has from an earlier version."""
     for scene in bpy.data.scenes:
-        if scene.library is None and scene.radiosity.lightmap_only:
+        # Asking for its settings gives a scene some.
+        if scene.library is None and scene.is_property_set("radiosity") and scene.radiosity.lightmap_only:
             scene.radiosity.property_unset("lightmap_only")
             scene.radiosity.show = "lightmap"
 
