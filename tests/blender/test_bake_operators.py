@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.images.node_group import GROUP_NAME
 from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.operators.bake_operators import show_result
 from radiosity_addon.blender.operators.checks import look
 from radiosity_addon.blender.operators.cleaning import interrupted_folders
 from radiosity_addon.blender.session import last_bake
@@ -195,6 +197,19 @@ def test_what_is_shown_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
         assert shown() == {chosen}
         bake()
         assert shown() == {chosen}
+
+
+def test_the_preview_after_a_bake_has_the_light_of_the_scene(box: bpy.types.Scene) -> None:
+    """The studio's light would shine on baked surfaces."""
+    spaces = [area.spaces.active for screen in bpy.data.screens for area in screen.areas]
+    space = next(space for space in spaces if space.type == "VIEW_3D")
+    shading, context = space.shading, SimpleNamespace(space_data=space, scene=box)
+    shading.type, shading.use_scene_lights, shading.use_scene_world = "SOLID", False, False
+    show_result(context)
+    assert (shading.type, shading.use_scene_lights, shading.use_scene_world) == ("MATERIAL", True, True)
+    shading.use_scene_world = False
+    show_result(context)
+    assert not shading.use_scene_world
 
 
 def test_a_file_of_an_earlier_version_that_shows_the_lightmap_alone_says_so(

@@ -180,11 +180,15 @@ def show_folder(folder: str) -> None:
 
 
 def show_result(context: bpy.types.Context) -> None:
-    """Switch a viewport that shows no materials to the preview that does, if that is wanted."""
+    """Switch a viewport that shows no materials to the preview that does, if that is wanted.
+
+    It has the scene's lamps and world, for no other light is to shine on baked surfaces.
+    """
     space = context.space_data
     wanted = context.scene.radiosity.show_result
     if wanted and isinstance(space, bpy.types.SpaceView3D) and space.shading.type in {"WIREFRAME", "SOLID"}:
         space.shading.type = "MATERIAL"
+        space.shading.use_scene_lights = space.shading.use_scene_world = True
 
 
 CLASSES = (RADIOSITY_OT_bake, RADIOSITY_OT_restore, RADIOSITY_OT_add_cornell_box, RADIOSITY_OT_open_folder)
