@@ -199,6 +199,22 @@ def test_what_is_shown_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
         assert shown() == {chosen}
 
 
+def test_undo_of_another_look_brings_the_earlier_one_back(box: bpy.types.Scene) -> None:
+    def seen() -> tuple[str, str]:
+        (tree,) = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]
+        (result,) = (node for node in tree.nodes if node.type == "GROUP_OUTPUT")
+        return bpy.context.scene.radiosity.show, result.inputs[0].links[0].from_node.name
+
+    bake()
+    bpy.ops.ed.undo_push(message="baked")
+    box.radiosity.show = "matte"
+    bpy.ops.ed.undo_push(message="matte")
+    bpy.ops.ed.undo()
+    assert seen() == ("shine", "shine")
+    bpy.ops.ed.redo()
+    assert seen() == ("matte", "matte")
+
+
 def test_the_preview_after_a_bake_has_the_light_of_the_scene(box: bpy.types.Scene) -> None:
     """The studio's light would shine on baked surfaces."""
     spaces = [area.spaces.active for screen in bpy.data.screens for area in screen.areas]
