@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from radiosity_addon.blender.command_line.main import main
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 from radiosity_addon.exports import read_ktx2
 from tests.browser.browser import viewer
 from tests.browser.textured_room import build
@@ -39,6 +40,7 @@ def pictures(folder: Path) -> None:
     sampled = light[step // 2 :: step, step // 2 :: step]
     exposure = 0.3 / np.exp(np.log(sampled[sampled > 0]).mean())  # as viewer.js has it
     bpy.ops.wm.open_mainfile(filepath=str(out / "baked.blend"))
+    show_lightmaps("matte")
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.samples = "CYCLES", 16
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT

@@ -16,11 +16,13 @@ from .operators import cleaning, edit_guard
 from .overlays import overlay_view
 from .relight import lightmap_versions
 from .session import facts, state
+from .settings import properties
 
 ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_pre", ownership.forget_unsaved),
     ("load_pre", lightmap_versions.forget),
     ("load_pre", state.forget_file),
+    ("load_post", properties.read_earlier),
     ("load_post", lightmap_versions.check),
     ("load_post", cleaning.look_at_file),
     ("save_pre", lightmap_versions.before_saving),

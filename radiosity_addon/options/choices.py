@@ -21,6 +21,17 @@ SIZE_MODES = (
     Choice("density", "Density", "Pixels per meter of surface; the image size follows"),
 )
 
+LOOKS = (
+    Choice(
+        "shine",
+        "Shine",
+        "Base color × lightmap, with the material's own highlights and reflections: specular, metal, coat, "
+        "sheen and normal map. Lamps add highlights, but no more diffuse light",
+    ),
+    Choice("matte", "Matte", "Base color × lightmap alone, also for metals; no lamp changes it"),
+    Choice("lightmap", "Lightmap", "The lightmap alone, as on white surfaces"),
+)
+
 ATLASES = (
     Choice("shared", "Shared", "One image for all objects"),
     Choice("per-object", "Per Object", "An image for each object"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .choices import EXPORT_FORMS, SCOPES, SIZE_MODES
+from .choices import EXPORT_FORMS, LOOKS, SCOPES, SIZE_MODES
 from .export_forms import SUM_GROUPS
 from .option_record import PanelRow, option, options_of
 from .sections import EXPORT, FILES, LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
@@ -81,11 +81,12 @@ class _PanelSettings:
         VIEWPORT,
         panel=PanelRow("Show Result"),
     )
-    lightmap_only: bool = option(
-        False,
-        "Show only the lightmaps instead of base color × lightmap",
+    show: str = option(
+        "shine",
+        "How baked objects look in material preview and in renders",
         LAST_BAKE,
-        panel=PanelRow("Lightmap Only"),
+        choices=LOOKS,
+        panel=PanelRow("Show", expand=True),
     )
     export_web: bool = _form("web", True)
     export_glb: bool = _form("glb")

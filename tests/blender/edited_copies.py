@@ -7,7 +7,16 @@ from collections.abc import Callable
 import bpy
 
 from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
-from tests.blender.hand_bake import BASE, add_plane, add_shader, bake_by_hand, principled_material
+from radiosity_addon.blender.material_copies.copy_marks import behind_ours
+from radiosity_addon.blender.material_edits.stripping import is_lightmap_node
+from tests.blender.hand_bake import (
+    BASE,
+    add_plane,
+    add_shader,
+    bake_by_hand,
+    link_surface,
+    principled_material,
+)
 from tests.blender.material_zoo import ZOO
 from tests.blender.scenes import add_node, with_nodes
 
@@ -24,9 +33,19 @@ def shader(material: Material, kind: str = "BSDF_PRINCIPLED") -> bpy.types.Node:
     return next(node for node in material.node_tree.nodes if node.type == kind)
 
 
+def lightmap_node(copy: Material) -> bpy.types.Node:
+    (node,) = (node for node in copy.node_tree.nodes if is_lightmap_node(node))
+    return node
+
+
+def constant_of(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """What the panel and the node editor show as an input's constant on a copy: a node's output."""
+    return behind_ours(socket).links[0].from_socket
+
+
 def color_node(copy: Material) -> bpy.types.NodeSocket:
     """The node that the panel and the node editor show as Base Color."""
-    return shader(copy).inputs["Base Color"].links[0].from_node.outputs[0]
+    return constant_of(shader(copy).inputs["Base Color"])
 
 
 def base_color(material: Material) -> tuple[float, ...]:
@@ -117,7 +136,67 @@ def odd_materials() -> dict[str, Callable[[], Material]]:
             tree.links.new(color.outputs[0], shader(material).inputs[name])
         return material
 
+    def muted_color() -> Material:
+        material = principled_material()
+        add_texture(material).outputs["Color"].links[0].is_muted = True
+        return material
+
+    def metal_map() -> Material:
+        """Base color by a reroute, metal and roughness by a picture."""
+        material = principled_material(Coat_Weight=0.5)
+        tree, inputs = material.node_tree, shader(material).inputs
+        texture, reroute = add_texture(material), tree.nodes.new("NodeReroute")
+        tree.links.new(texture.outputs["Color"], reroute.inputs[0])
+        tree.links.new(reroute.outputs[0], inputs["Base Color"])
+        for name in ("Metallic", "Roughness", "Transmission Weight"):
+            tree.links.new(texture.outputs["Alpha"], inputs[name])
+        inputs["Coat Weight"].keyframe_insert("default_value", frame=1)
+        return material
+
+    def one_shader_twice() -> Material:
+        """Mixed with itself, and under both outputs."""
+        material = principled_material()
+        tree, mix = material.node_tree, add_shader(material, "MixShader", Fac=0.25)
+        other = tree.nodes.new("ShaderNodeOutputMaterial")
+        other.target = "EEVEE"
+        for socket in (*mix.inputs[1:], other.inputs["Surface"]):
+            tree.links.new(shader(material).outputs[0], socket)
+        link_surface(material, mix.outputs[0])
+        return material
+
+    def one_group_twice() -> Material:
+        material, group = grouped_material()
+        tree, mix = material.node_tree, add_shader(material, "MixShader", Fac=0.25)
+        second = tree.nodes.new("ShaderNodeGroup")
+        second.node_tree = group
+        for node, socket in zip((shader(material, "GROUP"), second), mix.inputs[1:], strict=True):
+            tree.links.new(node.outputs[0], socket)
+        output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+        tree.links.new(mix.outputs[0], output.inputs["Surface"])
+        return material
+
+    def color_at_the_output() -> Material:
+        material = principled_material()
+        link_surface(material, add_texture(material).outputs["Color"])
+        return material
+
+    def muted_shader() -> Material:
+        """Of a muted mix the first shader counts."""
+        material = principled_material()
+        mix = add_shader(material, "MixShader")
+        material.node_tree.links.new(shader(material).outputs[0], mix.inputs[1])
+        material.node_tree.links.new(add_shader(material, "BsdfDiffuse").outputs[0], mix.inputs[2])
+        link_surface(material, mix.outputs[0])
+        mix.mute = True
+        return material
+
     return {
+        "muted color": muted_color,
+        "metal map": metal_map,
+        "one shader twice": one_shader_twice,
+        "one group twice": one_group_twice,
+        "color at the output": color_at_the_output,
+        "muted shader": muted_shader,
         "two outputs": two_outputs,
         "muted link": muted_link,
         "coordinates": coordinates,

@@ -15,6 +15,7 @@ from radiosity_addon.blender.apply.rebake import originals_shown, replacing_earl
 from radiosity_addon.blender.images.group_images import write_groups
 from radiosity_addon.blender.images.images import write_pages
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -61,6 +62,7 @@ def bake_groups(
     with replacing_earlier(bpy.context) as earlier:
         images, groups = write_pages(result, wanted, folder), write_groups(result, wanted, folder)
         apply_lightmaps(bpy.context, export, result, images, wanted, groups, earlier)
+        show_lightmaps("matte")
         if failing is not None:
             raise failing
     return result

@@ -13,6 +13,7 @@ from radiosity_addon.bake.result.result import BakedObject, BakeResult
 from radiosity_addon.blender.apply.apply import apply_lightmaps
 from radiosity_addon.blender.apply.rebake import originals_shown, replacing_earlier
 from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.blender.scene_records.export_sources import Export
 from radiosity_addon.lightmap.images.page import LightmapPage
@@ -49,11 +50,13 @@ def bake_by_hand(
     colors: Sequence[Sequence[float]] = (TEXEL,),
     folder: Path | None = None,
     failing: Exception | None = None,
+    show: str = "matte",
     **settings: object,
 ) -> BakeResult:
     """Export the open scene, pretend to bake it, and show the result, in place of any bake that is shown.
 
     `failing` is raised once the lightmaps are shown.
+    show: How; a matte surface sends the same to all sides.
     """
     wanted = BakeSettings(**{"resolution": SMALL, **settings})
     with originals_shown(bpy.context):
@@ -62,6 +65,7 @@ def bake_by_hand(
     with replacing_earlier(bpy.context) as earlier:
         images = write_pages(result, wanted, folder)
         behind = apply_lightmaps(bpy.context, export, result, images, wanted, earlier=earlier)
+        show_lightmaps(show)
         if failing is not None:
             raise failing
     return replace(result, warnings=behind)
@@ -103,7 +107,7 @@ def link_surface(material: bpy.types.Material, socket: bpy.types.NodeSocket) -> 
     tree.links.new(socket, tree.nodes["Material Output"].inputs["Surface"])
 
 
-def seen_from_above(folder: Path, size: int = 2, engine: str = "CYCLES") -> np.ndarray:
+def seen_from_above(folder: Path, size: int = 2, engine: str = "CYCLES", samples: int = 16) -> np.ndarray:
     """Render the square [-1, 1]² from above: (size, size, 3) radiance, bottom row first."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
@@ -112,7 +116,7 @@ def seen_from_above(folder: Path, size: int = 2, engine: str = "CYCLES") -> np.n
     scene.collection.objects.link(camera)
     scene.camera = camera
     scene.render.engine = engine
-    scene.cycles.samples, scene.cycles.use_denoising = 16, False
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
     scene.render.resolution_x = scene.render.resolution_y = size
     scene.render.resolution_percentage = 100

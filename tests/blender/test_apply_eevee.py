@@ -1,9 +1,10 @@
-"""EEVEE shows a lightmap as Cycles does."""
+"""EEVEE shows a lightmap, and what shines on it, as Cycles does."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.blender.eevee import seen_in_eevee
@@ -22,3 +23,31 @@ def test_eevee_shows_base_color_times_lightmap_plus_emission(tmp_path: Path) -> 
     (seen,) = seen_in_eevee(SCRIPT, tmp_path)
     # Base color (0.5, 0.25, 0.75), texel (0.25, 0.5, 3), emission 0.5; EEVEE's pixels are half floats.
     assert seen == pytest.approx([0.625, 0.625, 2.75], rel=2e-3)
+
+
+SHINE = """
+from radiosity_addon.blender.datablocks import bake_record
+from tests.blender.scenes import add_lamp
+bake_record.register()
+for inputs in dict(Specular_IOR_Level=0.0, Alpha=0.5), dict(Metallic=1.0, Roughness=0.5):
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    hand_bake.add_plane(material=hand_bake.principled_material(**inputs))
+    hand_bake.bake_by_hand(folder=Path(sys.argv[1]), show="shine")
+    look()
+    add_lamp("SUN", energy=3.0, use_shadow=False)
+    look()
+    hand_bake.show_lightmaps("matte")
+    look()
+"""
+
+
+def test_in_eevee_lamps_light_what_shines_and_nothing_else(tmp_path: Path) -> None:
+    (paint, lit_paint, matte_paint), (metal, lit_metal, matte_metal) = seen_in_eevee(SHINE, tmp_path).reshape(
+        2, 3, 3
+    )
+    assert paint.any()
+    np.testing.assert_array_equal(lit_paint, paint)
+    np.testing.assert_array_equal(matte_paint, paint)
+    assert not metal.any()
+    assert (lit_metal > 0.1).all()
+    np.testing.assert_allclose(matte_metal, [0.125, 0.125, 2.25], rtol=2e-3)

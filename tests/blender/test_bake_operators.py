@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -13,7 +14,9 @@ from radiosity_addon.base.errors import BakeError, SceneError
 from radiosity_addon.blender.datablocks.bake_record import is_baked, shows_lightmap
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import OutputFolder
+from radiosity_addon.blender.images.node_group import GROUP_NAME
 from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.operators.bake_operators import show_result
 from radiosity_addon.blender.operators.checks import look
 from radiosity_addon.blender.operators.cleaning import interrupted_folders
 from radiosity_addon.blender.session import last_bake
@@ -181,18 +184,61 @@ def test_an_edit_of_a_baked_object_is_there_after_the_next_bake(box: bpy.types.S
     assert min(vertex.co.z for vertex in mesh.vertices) == lowest + 1
 
 
-def test_lightmap_only_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
-    def switches() -> set[float]:
-        trees = [material.node_tree for material in bpy.data.materials if "Lightmap" in material.name]
-        groups = [node for tree in trees for node in tree.nodes if node.type == "GROUP"]
-        return {group.inputs["Lightmap Only"].default_value for group in groups}
+def test_what_is_shown_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
+    def shown() -> set[str]:
+        trees = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]
+        results = [node for tree in trees for node in tree.nodes if node.type == "GROUP_OUTPUT"]
+        return {result.inputs[0].links[0].from_node.name for result in results}
 
     bake()
-    assert switches() == {0.0}
-    box.radiosity.lightmap_only = True
-    assert switches() == {1.0}
+    assert shown() == {"shine"}
+    for chosen in ("matte", "lightmap"):
+        box.radiosity.show = chosen
+        assert shown() == {chosen}
+        bake()
+        assert shown() == {chosen}
+
+
+def test_undo_of_another_look_brings_the_earlier_one_back(box: bpy.types.Scene) -> None:
+    def seen() -> tuple[str, str]:
+        (tree,) = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]
+        (result,) = (node for node in tree.nodes if node.type == "GROUP_OUTPUT")
+        return bpy.context.scene.radiosity.show, result.inputs[0].links[0].from_node.name
+
     bake()
-    assert switches() == {1.0}
+    bpy.ops.ed.undo_push(message="baked")
+    box.radiosity.show = "matte"
+    bpy.ops.ed.undo_push(message="matte")
+    bpy.ops.ed.undo()
+    assert seen() == ("shine", "shine")
+    bpy.ops.ed.redo()
+    assert seen() == ("matte", "matte")
+
+
+def test_the_preview_after_a_bake_has_the_light_of_the_scene(box: bpy.types.Scene) -> None:
+    """The studio's light would shine on baked surfaces."""
+    spaces = [area.spaces.active for screen in bpy.data.screens for area in screen.areas]
+    space = next(space for space in spaces if space.type == "VIEW_3D")
+    shading, context = space.shading, SimpleNamespace(space_data=space, scene=box)
+    shading.type, shading.use_scene_lights, shading.use_scene_world = "SOLID", False, False
+    show_result(context)
+    assert (shading.type, shading.use_scene_lights, shading.use_scene_world) == ("MATERIAL", True, True)
+    shading.use_scene_world = False
+    show_result(context)
+    assert not shading.use_scene_world
+
+
+def test_a_file_of_an_earlier_version_that_shows_the_lightmap_alone_says_so(
+    box: bpy.types.Scene, tmp_path: Path
+) -> None:
+    box.radiosity.lightmap_only = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "earlier.blend"))
+    assert bpy.context.scene.radiosity.show == "lightmap"
+    bpy.context.scene.radiosity.show = "matte"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "later.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "later.blend"))
+    assert bpy.context.scene.radiosity.show == "matte"
 
 
 @pytest.mark.parametrize("again", [False, True], ids=["first bake", "over an earlier one"])

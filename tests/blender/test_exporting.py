@@ -19,6 +19,7 @@ from radiosity_addon.blender.operators.export_operators import export_folder, is
 from radiosity_addon.exports import Glb
 
 from . import group_bake
+from .edited_copies import shader
 from .hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
 
 
@@ -71,6 +72,35 @@ def test_the_panel_exports_next_to_the_lightmaps(baked: Path) -> None:
     color = material["pbrMetallicRoughness"]["baseColorFactor"]
     np.testing.assert_allclose(color, (*BASE, 1.0), atol=1e-6)
     assert sorted(node["name"] for node in glb.json["nodes"]) == ["Other", "Plane"]
+
+
+def test_roughness_and_metal_are_exported_as_they_are(baked: Path) -> None:
+    """Constants and images of the original; where the light is baked in, surfaces stay matte."""
+    material, folder = bpy.data.materials["Paint"], export_folder(bpy.context)
+    tree, inputs = material.node_tree, shader(material).inputs
+    inputs["Roughness"].default_value, inputs["Metallic"].default_value = 0.25, 0.75
+
+    def exported(file: str) -> tuple[dict[str, Any], dict[str, Any]]:
+        glb = Glb.of_bytes((folder / file).read_bytes())
+        (written,) = glb.json["materials"]
+        return glb.json, written["pbrMetallicRoughness"]
+
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    _, surface = exported("scene.glb")
+    assert (surface["roughnessFactor"], surface["metallicFactor"]) == pytest.approx((0.25, 0.75))
+    assert exported("scene_baked.glb")[1]["metallicFactor"] == 0.0
+    image = bpy.data.images.new("Worn", 2, 2)
+    image.colorspace_settings.name = "Non-Color"
+    image.pack()
+    texture, parts = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeSeparateColor")
+    texture.image = image
+    tree.links.new(texture.outputs["Color"], parts.inputs["Color"])
+    tree.links.new(parts.outputs["Green"], inputs["Roughness"])
+    tree.links.new(parts.outputs["Blue"], inputs["Metallic"])
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    written, surface = exported("scene.glb")
+    source = written["textures"][surface["metallicRoughnessTexture"]["index"]]["source"]
+    assert written["images"][source]["name"] == "Worn"
 
 
 def test_an_export_of_other_lightmaps_is_outdated(baked: Path) -> None:

@@ -15,7 +15,7 @@ from radiosity_addon.blender.datablocks.bake_record import made_datablocks
 from radiosity_addon.blender.images.group_images import shown_images, update_images
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 from radiosity_addon.blender.material_copies.light_shares import MANY_IMAGES, LightShares, crowded_materials
-from radiosity_addon.blender.material_copies.lightmap_materials import LightmapMaterials
+from radiosity_addon.blender.material_copies.lightmap_materials import LightmapMaterials, show_lightmaps
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.group_bake import (
@@ -68,6 +68,17 @@ def test_radiosity_has_its_emission_in_its_groups(tmp_path: Path) -> None:
     slide("Lamps", 0.0)
     slide("Glow", 2.0)
     np.testing.assert_allclose(seen(tmp_path), 2 * np.array(GLOW) / math.pi, rtol=1e-4, atol=1e-6)
+
+
+def test_what_shines_follows_sliders_and_glows_once(plane: bpy.types.Object, tmp_path: Path) -> None:
+    """Emission is in the lightmap's node alone, not in the shader, too."""
+    plane.data.materials[0].node_tree.nodes["Principled BSDF"].inputs[
+        "Specular IOR Level"
+    ].default_value = 0.0
+    bake_groups()
+    show_lightmaps("shine")
+    slide("Glow", 3.0, (1.0, 0.5, 0.0))
+    np.testing.assert_allclose(seen(tmp_path), expected(1, np.array([3.0, 1.5, 0.0])), rtol=1e-4)
 
 
 def test_keyframes_change_what_is_rendered_and_outlive_saving(tmp_path: Path) -> None:

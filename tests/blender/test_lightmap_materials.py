@@ -13,7 +13,7 @@ from radiosity_addon.bake.result.result import BakedObject, BakeResult
 from radiosity_addon.blender.apply.apply import apply_lightmaps
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.images.images import write_pages
-from radiosity_addon.blender.material_copies.lightmap_materials import set_lightmap_only
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -55,7 +55,7 @@ def test_radiance_is_right_for_each_quantity(
 def test_lightmap_only_shows_what_a_white_surface_would(tmp_path: Path, quantity: str, factor: float) -> None:
     add_plane(material=principled_material(Emission_Color=(1.0, 1.0, 1.0, 1.0), Emission_Strength=2.0))
     bake_by_hand(quantity=quantity)
-    assert set_lightmap_only(True) == 1
+    assert show_lightmaps("lightmap") == 1
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(TEXEL, factor), rtol=1e-4)
 
 
@@ -66,8 +66,8 @@ def test_a_residual_is_red_where_positive_and_blue_where_negative(
     """Ten times the channels' mean over π, whatever the material; nothing shines negatively."""
     add_plane(material=principled_material(Emission_Color=(1.0, 1.0, 1.0, 1.0), Emission_Strength=2.0))
     bake_by_hand((texel,), quantity="residual", folder=tmp_path)
-    for lightmap_only in (False, True):
-        set_lightmap_only(lightmap_only)
+    for look in ("shine", "matte", "lightmap"):
+        show_lightmaps(look)
         np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.divide(shown, math.pi), atol=1e-5)
 
 

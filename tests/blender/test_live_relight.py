@@ -16,6 +16,7 @@ from radiosity_addon.blender.relight.live_scene import LiveScene
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
 from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import digest_of_file
+from tests.blender.edited_copies import lightmap_node
 from tests.blender.scenes import shader_material
 from tests.blender.test_relight_scene import change_lights, glowing, lightmap, relative, relight, room
 from tests.wording import says
@@ -255,8 +256,7 @@ def test_emission_that_varies_follows_its_slider(saved: Path, tmp_path: Path) ->
     assert relight() == {"FINISHED"}
     np.testing.assert_allclose(shown, lightmap(), rtol=5e-3, atol=1e-4)
     (slot,) = bpy.data.objects["Panel"].material_slots
-    (group,) = (node for node in slot.material.node_tree.nodes if node.type == "GROUP")
-    (link,) = group.inputs[EMISSION].links
+    (link,) = lightmap_node(slot.material).inputs[EMISSION].links
     assert link.from_node.type == "VECT_MATH"
     (strength,) = link.from_node.inputs["Scale"].links
     assert strength.from_socket.default_value == 9.0

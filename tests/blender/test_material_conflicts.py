@@ -17,6 +17,7 @@ from tests.blender.edited_copies import (
     Material,
     base_color,
     color_node,
+    constant_of,
     copy_of,
     grouped_material,
     shader,
@@ -104,7 +105,7 @@ def test_an_edit_of_no_material_becomes_a_material(tmp_path: Path) -> None:
     copy = copy_of(None)
     assert carry_material_edits() == ()
     assert copy.get(ORIGINAL) is None
-    shader(copy, "BSDF_DIFFUSE").inputs["Color"].links[0].from_node.outputs[0].default_value = GREEN
+    constant_of(shader(copy, "BSDF_DIFFUSE").inputs["Color"]).default_value = GREEN
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(GREEN[:3], TEXEL), rtol=1e-4)
     assert carry_material_edits() == ()
     own = copy[ORIGINAL]
@@ -153,7 +154,7 @@ def test_a_node_group_edited_in_two_materials_becomes_two() -> None:
     for material, value in ((first, 0.25), (second, 0.5)):
         inner = shader(copy_of(material), "GROUP").node_tree
         assert inner != group
-        inner.nodes["Diffuse BSDF"].inputs["Color"].links[0].from_node.outputs[0].default_value = (value,) * 4
+        constant_of(inner.nodes["Diffuse BSDF"].inputs["Color"]).default_value = (value,) * 4
     (warning,) = carry_material_edits()
     assert warning.name.startswith("Wrapped.")
     assert "node group 'Wrapped'" in warning.message

@@ -24,8 +24,10 @@ from tests.blender.edited_copies import (
     add_texture,
     base_color,
     color_node,
+    constant_of,
     copy_of,
     grouped_material,
+    lightmap_node,
     shader,
 )
 from tests.blender.hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
@@ -47,14 +49,14 @@ def test_another_base_color_shows_at_once(kind: str, tmp_path: Path) -> None:
     bake_by_hand()
     node = shader(copy_of(material), kind)
     socket = node.inputs["Color" if kind == "BSDF_DIFFUSE" else "Base Color"]
-    socket.links[0].from_node.outputs[0].default_value = GREEN
+    constant_of(socket).default_value = GREEN
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(GREEN[:3], TEXEL), rtol=1e-4)
 
 
 def test_emission_shows_at_once_also_where_there_was_none(paint: Material, tmp_path: Path) -> None:
     node = shader(copy_of(paint))
-    node.inputs["Emission Color"].links[0].from_node.outputs[0].default_value = GREEN
-    node.inputs["Emission Strength"].links[0].from_node.outputs[0].default_value = 2.0
+    constant_of(node.inputs["Emission Color"]).default_value = GREEN
+    constant_of(node.inputs["Emission Strength"]).default_value = 2.0
     expected = np.multiply(BASE, TEXEL) + 2.0 * np.array(GREEN[:3])
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], expected, rtol=1e-4)
     restore(bpy.context)
@@ -68,7 +70,7 @@ def test_a_constant_inside_a_node_group_shows_at_once(tmp_path: Path) -> None:
     inner = shader(copy_of(material), "GROUP").node_tree
     assert inner != group
     diffuse = next(node for node in inner.nodes if node.type == "BSDF_DIFFUSE")
-    diffuse.inputs["Color"].links[0].from_node.outputs[0].default_value = GREEN
+    constant_of(diffuse.inputs["Color"]).default_value = GREEN
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(GREEN[:3], TEXEL), rtol=1e-4)
     restore(bpy.context)
     assert shader(material, "GROUP").node_tree == group
@@ -85,7 +87,7 @@ def color_by_script(copy: Material) -> None:
 
 def color_in_the_lightmap_node(copy: Material) -> None:
     """What one does in the panel: disconnect Base Color of the first node, and pick a color."""
-    node = shader(copy, "GROUP")
+    node = lightmap_node(copy)
     copy.node_tree.links.remove(node.inputs["Base Color"].links[0])
     node.inputs["Base Color"].default_value = GREEN
 
@@ -93,7 +95,7 @@ def color_in_the_lightmap_node(copy: Material) -> None:
 def texture_behind_the_color(copy: Material) -> None:
     """What one does in the panel, too: a node in the place of the color."""
     source = add_node(copy.node_tree, "ShaderNodeBrightContrast", Color=GREEN)
-    copy.node_tree.links.new(source.outputs[0], shader(copy, "GROUP").inputs["Base Color"])
+    copy.node_tree.links.new(source.outputs[0], lightmap_node(copy).inputs["Base Color"])
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.files.file_names import PREVIEW_NAME
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
-from tests.blender.hand_bake import hand_result
+from tests.blender.hand_bake import BASE, bake_by_hand, hand_result, principled_material, seen_from_above
 
 pytestmark = pytest.mark.usefixtures("record")
 
@@ -76,6 +76,18 @@ def test_the_staged_lightmap_is_seen_by_the_scene_s_camera(tmp_path: Path) -> No
     pixels = _pixels(tmp_path / PREVIEW_NAME)
     assert pixels.shape == (8, 16, 3)
     assert np.abs(pixels - 0.8 * np.array((0.25, 0.5, 1.0))).max() <= 1.01 / 255
+
+
+def test_the_picture_is_matte_whatever_is_shown(tmp_path: Path) -> None:
+    """A mirror, which shows its base color × lightmap there and the dark elsewhere."""
+    _square(0.0, 10.0)
+    bpy.data.objects["Square"].data.materials.append(principled_material(Metallic=1.0, Roughness=0.0))
+    _camera()
+    _small(8, 8)
+    bake_by_hand(((1.0, 1.0, 1.0),), show="shine")
+    render_preview(bpy.context, tmp_path / PREVIEW_NAME, BakeSettings())
+    assert np.abs(_pixels(tmp_path / PREVIEW_NAME) - BASE).max() < 2 / 255
+    assert not seen_from_above(tmp_path).any()
 
 
 def test_without_a_camera_all_baked_objects_are_in_view(tmp_path: Path) -> None:

@@ -16,10 +16,12 @@ from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from radiosity_addon.blender.images.images import image_scale
 from radiosity_addon.blender.images.node_group import EMISSION, SCALE
+from radiosity_addon.blender.material_edits.stripping import is_lightmap_node
 from radiosity_addon.blender.materials.light_inputs import inputs_of
 from radiosity_addon.blender.relight.relight_scene import kept_bakes
 from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import is_as_written
+from tests.blender.edited_copies import constant_of, lightmap_node
 from tests.blender.scenes import add_lamp, add_mesh, add_object, set_world, shader_material
 
 LIGHTMAP = "baked_Scene_lightmap.exr"
@@ -104,9 +106,9 @@ def change_lights() -> None:
 def glowing() -> list[float]:
     """What the panel's lightmap material adds of its own."""
     (material,) = (slot.material for slot in bpy.data.objects["Panel"].material_slots)
-    (group,) = (node for node in material.node_tree.nodes if node.type == "GROUP")
-    (scaled,) = (link.from_node for link in group.inputs[EMISSION].links)
-    color, strength = (scaled.inputs[name].links[0].from_socket for name in ("Vector", "Scale"))
+    (scaled,) = (link.from_node for link in lightmap_node(material).inputs[EMISSION].links)
+    color = constant_of(scaled.inputs["Vector"].links[0].from_node.inputs["Color"])
+    strength = scaled.inputs["Scale"].links[0].from_socket
     return [component * strength.default_value for component in color.default_value[:3]]
 
 
@@ -290,7 +292,7 @@ def test_png_files_get_another_scale_everywhere(tmp_path: Path, folder: Path) ->
         for material in bpy.data.materials
         if is_made(material)
         for node in material.node_tree.nodes
-        if node.type == "GROUP"
+        if is_lightmap_node(node)
     ]
     np.testing.assert_allclose(inputs, image_scale(image), rtol=1e-5)
     report = json.loads((tmp_path / "lightmaps" / "room_Scene_report.json").read_text())

@@ -10,7 +10,7 @@ import pytest
 
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import ORIGINAL
-from radiosity_addon.blender.material_copies.lightmap_materials import set_lightmap_only
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 from radiosity_addon.blender.material_copies.material_digest import digest_of_material, links_of
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.material_edits.stripping import stripped_copy
@@ -84,7 +84,7 @@ def test_records_hold_after_saving_and_loading(tmp_path: Path) -> None:
 
 def test_what_lightmaps_change_themselves_is_no_edit(paint: Material) -> None:
     content = digest_of_material(paint)
-    set_lightmap_only(True)
+    show_lightmaps("lightmap")
     bpy.data.images[0].name = "other"
     assert carry_material_edits() == ()
     assert digest_of_material(paint) == content

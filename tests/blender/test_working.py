@@ -32,7 +32,7 @@ def odd_values() -> None:
     """Set every property to something that is not its default."""
     group = bpy.context.scene.radiosity
     for prop in group.bl_rna.properties:
-        if prop.identifier in {"rna_type", "name", "lightmap_only"} or prop.is_readonly:
+        if prop.identifier in {"rna_type", "name", "show", "lightmap_only"} or prop.is_readonly:
             continue
         before = getattr(group, prop.identifier)
         if prop.type == "ENUM":

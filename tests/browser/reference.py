@@ -7,12 +7,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from radiosity_addon.blender.material_copies.lightmap_materials import set_lightmap_only
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 
 
 def rendered(folder: Path, width: int, height: int, *, lightmap_only: bool) -> np.ndarray:
     """Render the open scene, whose materials emit; (height, width, 4) float32, row 0 at the bottom."""
-    set_lightmap_only(lightmap_only)
+    show_lightmaps("lightmap" if lightmap_only else "matte")
     scene = bpy.context.scene
     render = scene.render
     render.engine = "CYCLES"

@@ -16,7 +16,7 @@ from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.image_marks import GROUP
 from ..datablocks.image_values import known_means_only
 from ..material_copies.material_slots import original_of
-from ..material_copies.surface_nodes import SurfaceSockets, feed_color, feed_float, read_surface
+from ..material_copies.surface_nodes import SurfaceReader, SurfaceSockets, feed_color, feed_float
 from ..material_copies.uv_pin import pin_uvs
 from ..materials.materials import read_material, uses_nodes
 from ..materials.shader_nodes import MissingImageError, NotConstantError, evaluate, feed_of, output_node
@@ -104,7 +104,7 @@ def export_material(
     output = output_node(tree) or tree.nodes.new("ShaderNodeOutputMaterial")
     shown_as = original.name if original else "No Material"
     notes = tuple(f"material '{shown_as}': {missing}" for missing in _unlink_missing(tree))
-    surface = read_surface(tree, output.inputs["Surface"], unknown)
+    surface = SurfaceReader(unknown).shader(output.inputs["Surface"], tree)
     principled = feed_of(output.inputs["Surface"], enter_groups=False).node
     keeps_shine = principled is not None and principled.type == "BSDF_PRINCIPLED"
     if not keeps_shine:
@@ -173,7 +173,7 @@ def _constant(source: Any, channel: str) -> tuple[float, ...] | None:
         values = (source,) * 3 if channel == ALPHA else source
         return tuple(float(value) for value in values)
     node = source.node
-    if node.type == "VECT_MATH" and node.operation == "SCALE":  # color × strength, as `read_surface` has it
+    if node.type == "VECT_MATH" and node.operation == "SCALE":  # color × strength, as `SurfaceReader` has it
         color, strength = (_constant_input(node.inputs[name]) for name in ("Vector", "Scale"))
         return None if color is None or strength is None else tuple(value * strength[0] for value in color)
     probe = node.id_data.nodes.new("ShaderNodeEmission")

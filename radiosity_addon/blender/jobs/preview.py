@@ -1,4 +1,4 @@
-"""A picture of the baked scene: Cycles on the CPU, in a scene of its own that is then removed."""
+"""A matte picture of the baked scene: Cycles on the CPU, in a scene of its own that is then removed."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ...base import BakeError
 from ...options import BakeSettings
 from ..datablocks.bake_record import is_made, shows_lightmap
 from ..datablocks.png import render_png
+from ..images.node_group import matte_groups
 
 SAMPLES = 8
 """A pixel's. Lightmapped surfaces have no noise, so these only smooth edges: 99 % of all pixels are
@@ -48,7 +49,7 @@ def render_preview(
         if scene.camera is None or scene.camera.type != "CAMERA":
             camera = _framing_camera(context, scene)
         _fit(scene.render)
-        with _lightmaps_at(path.parent):
+        with _lightmaps_at(path.parent), matte_groups():
             render_png(scene, path, samples, settings.seed, settings.threads)
     except (RuntimeError, TypeError) as error:
         raise BakeError(f"cannot render the preview '{path}': {' '.join(str(error).split())}") from error

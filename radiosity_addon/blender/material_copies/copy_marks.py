@@ -61,7 +61,8 @@ FOLLOWS = "radiosity_follows"
 """On a node that we added: node and input whose constant it repeats, where it cannot feed that."""
 
 FED, FED_BY = "radiosity_fed", "radiosity_fed_by"
-"""On the lightmap group's node: constants and sources of base color and emission when it was made."""
+"""On the lightmap group's node: constants and sources of base color, emission and diffuse color when it
+was made."""
 
 COPY_MARKS = (
     ORIGINAL,
@@ -100,6 +101,24 @@ def linked_output(socket: bpy.types.NodeSocket) -> str:
         return ""
     link = socket.links[0]
     return f"{link.from_node.name}\n{link.from_socket.identifier}"
+
+
+def behind_ours(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """Return the input that takes what an input would take without the nodes that we put in between."""
+    while socket.is_linked and socket.links[0].from_node.get(THROUGH):
+        socket = socket.links[0].from_node.inputs[0]
+    return socket
+
+
+def users_inputs(output: bpy.types.NodeSocket) -> Iterator[bpy.types.NodeSocket]:
+    """Yield the inputs of the user's that an output feeds, also by nodes that we put in between."""
+    for link in output.links:
+        node = link.to_node
+        if not is_added(node):
+            yield link.to_socket
+        elif node.get(THROUGH) and link.to_socket == node.inputs[0]:
+            for passed in node.outputs:
+                yield from users_inputs(passed)
 
 
 def is_copied_group(tree: bpy.types.NodeTree | None) -> bool:

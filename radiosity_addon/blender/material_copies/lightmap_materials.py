@@ -1,4 +1,4 @@
-"""Copies of materials that show a lightmap: base color × lightmap, plus their own light.
+"""Copies of materials that show a lightmap: base color × lightmap, plus their own light, and their shine.
 
 One copy for each (material, image, whether UVs are pinned, whether its slot is empty), shared
 between the objects for which these are the same. A copy holds the original's nodes, connected,
@@ -19,15 +19,19 @@ from ..datablocks.image_marks import GROUP
 from ..images.images import image_scale
 from ..images.light_mixer import factor_of
 from ..images.node_group import (
+    ALPHA,
     BASE_COLOR,
+    DIFFUSE_COLOR,
     EMISSION,
     EMISSION_FACTOR,
     LIGHTMAP,
     LIGHTMAP_ONLY,
+    LOOK_LIGHTMAP,
     SCALE,
     SHADER,
     SURFACE,
     lightmap_group,
+    show_in_groups,
 )
 from ..materials.materials import is_volume, read_material, uses_nodes
 from .copy_marks import (
@@ -47,7 +51,8 @@ from .copy_marks import (
 from .copy_record import record
 from .false_colors import false_colors
 from .light_shares import LightShares
-from .surface_nodes import SurfaceSockets, feed_color, feed_float, read_surface
+from .parted_surfaces import PartedSurfaces
+from .surface_nodes import SurfaceSockets, feed_color, feed_float
 from .uv_pin import pin_uvs
 
 RADIANCE_PER_TEXEL = {
@@ -121,12 +126,13 @@ class LightmapMaterials:
         before, active = {node.name for node in tree.nodes}, tree.nodes.active
         if pinned:
             pin_uvs(tree)
+        reader = PartedSurfaces(unknown)
         outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
         for index, output in enumerate(outputs or [tree.nodes.new("ShaderNodeOutputMaterial")]):
             if is_volume(output):
                 continue
-            surface = read_surface(tree, output.inputs["Surface"], unknown)
-            self._wire(tree, output, surface, image, group)
+            surface = reader.shader(output.inputs["Surface"], tree)
+            self._wire(tree, output, surface, image, group, reader.is_parted)
             if surface.glows:
                 self._glows[material], copy[GROUP] = True, group
             if index == 0:
@@ -145,8 +151,9 @@ class LightmapMaterials:
         surface: SurfaceSockets,
         image: bpy.types.Image,
         light_group: str,
+        is_parted: bool,
     ) -> None:
-        """Wire UV Map → Image → group → output; the transparent part stays so."""
+        """Wire UV Map → Image → group → output."""
         x, y = output.location.x - 500, output.location.y + 400
         uv_map = tree.nodes.new("ShaderNodeUVMap")
         uv_map.uv_map = LIGHTMAP_UV_LAYER
@@ -157,7 +164,10 @@ class LightmapMaterials:
         texture.interpolation = "Linear"
         texture.location = (x, y + 450)
         group = tree.nodes.new("ShaderNodeGroup")
-        group.node_tree = lightmap_group()
+        # Radiosity already holds what the surface reflects and emits, and so does its error.
+        holds_all = self._quantity in ("radiosity", "residual")
+        see_through = surface.alpha != 1.0
+        group.node_tree = lightmap_group(is_parted and not holds_all, see_through)
         group.name = group.label = group.node_tree.name
         group.location = (x + 300, y + 300)
         tree.links.new(uv_map.outputs["UV"], texture.inputs["Vector"])
@@ -174,38 +184,31 @@ class LightmapMaterials:
             tree.links.new(link.from_socket, group.inputs[SURFACE]).is_muted = link.is_muted
         group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * scale
 
-        # Radiosity already holds what the surface reflects and emits, and so does its error.
-        if self._quantity not in ("radiosity", "residual"):
+        if not holds_all:
             feed_color(tree, group.inputs[BASE_COLOR], surface.base)
+            feed_color(tree, group.inputs[DIFFUSE_COLOR], surface.diffuse)
             feed_color(tree, group.inputs[EMISSION], surface.emission)
-        fed = group.inputs[BASE_COLOR], group.inputs[EMISSION]
+        fed = [group.inputs[name] for name in (BASE_COLOR, EMISSION, DIFFUSE_COLOR)]
         group[FED] = [component for socket in fed for component in socket.default_value]
         group[FED_BY] = [linked_output(socket) for socket in fed]
-
-        shader = group.outputs[SHADER]
-        if surface.alpha != 1.0:
-            transparent = tree.nodes.new("ShaderNodeBsdfTransparent")
-            transparent.location = (x + 300, y + 450)
-            mix = tree.nodes.new("ShaderNodeMixShader")
-            mix.location = (x + 500, y + 300)
-            feed_float(tree, mix.inputs[0], surface.alpha)
-            tree.links.new(transparent.outputs[0], mix.inputs[1])
-            tree.links.new(shader, mix.inputs[2])
-            shader = mix.outputs[0]
-        tree.links.new(shader, output.inputs["Surface"])
+        if see_through:
+            feed_float(tree, group.inputs[ALPHA], surface.alpha)
+        tree.links.new(group.outputs[SHADER], output.inputs["Surface"])
 
 
-def set_lightmap_only(lightmap_only: bool) -> int:
-    """Show the lightmap alone, or base color × lightmap, in all lightmap materials.
+def show_lightmaps(look: str) -> int:
+    """Show a look in all lightmap materials: shine, matte, or the lightmap alone.
 
+    Materials of earlier versions, and lightmaps that cannot be parted from the shine, are matte instead.
     Returns how many materials there are.
     """
+    show_in_groups(look)
     count = 0
     for material in bpy.data.materials:
         if is_made(material) and material.node_tree is not None:
             for node in material.node_tree.nodes:
                 if node.type == "GROUP" and node.node_tree is not None and LIGHTMAP_ONLY in node.inputs:
-                    node.inputs[LIGHTMAP_ONLY].default_value = float(lightmap_only)
+                    node.inputs[LIGHTMAP_ONLY].default_value = float(look == LOOK_LIGHTMAP)
             count += 1
     return count
 

@@ -15,7 +15,7 @@ import bpy
 
 from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.keyed_paths import curves, path_of
-from ..images.node_group import BASE_COLOR, EMISSION
+from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR, EMISSION
 from ..materials.materials import uses_nodes
 from .copy_marks import COPY_MARKS, FED, NODE_MARKS, is_added, is_copied_group
 
@@ -117,7 +117,8 @@ def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
 def _settable(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
     """Return those sockets of a node of ours whose values the user may want to set."""
     if node.get(FED) is not None:
-        return [node.inputs[BASE_COLOR], node.inputs[EMISSION]]
+        names = (BASE_COLOR, EMISSION, DIFFUSE_COLOR)  # those of earlier versions do not have the last one
+        return [node.inputs[name] for name in names if name in node.inputs]
     return list(node.outputs) if node.type in OUTPUTS_WITH_VALUES else []
 
 

@@ -40,29 +40,16 @@ class SurfaceSockets:
         0 lets everything through.
     glows : bool
         Its emission is not the constant 0.
+    diffuse : color or socket
+        The part of `base` that the lightmap lights where the shader shows the rest itself; see
+        `parted_surfaces.py`.
     """
 
     base: ColorSource
     emission: ColorSource = BLACK
     alpha: FloatSource = 1.0
     glows: bool = False
-
-
-def read_surface(
-    tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown: SurfaceSockets
-) -> SurfaceSockets:
-    """Read the shader that feeds `socket`, through Mix and Add Shaders.
-
-    Parameters
-    ----------
-    tree : NodeTree
-        Nodes are added to it.
-    socket : NodeSocket
-        A shader input, such as Surface of the Material Output.
-    unknown : Surface
-        Taken for shaders that have no base color of their own to read.
-    """
-    return _SurfaceReader(unknown).shader(socket, tree)
+    diffuse: ColorSource = BLACK
 
 
 def feed_color(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: ColorSource) -> None:
@@ -81,38 +68,44 @@ def feed_float(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: F
         target.default_value = source
 
 
-class _SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
-    """Reads shaders as `read_surface`; places are trees."""
+class SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
+    """Reads shaders, through Mix and Add Shaders; places are trees, to which nodes are added.
+
+    unknown: Taken for shaders that have no base color of their own to read.
+    """
 
     def __init__(self, unknown: SurfaceSockets) -> None:
         self._unknown = unknown
 
     def shader(self, socket: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> SurfaceSockets:
+        """Read what feeds a shader input, such as Surface of the Material Output."""
         feed = feed_of(socket, enter_groups=False)
         node = feed.node
         if node is not None and node.type == "GROUP" and node.node_tree is not None:
             return self._grouped(node, feed.socket.identifier)
         if node is not None and node.type == "GROUP_INPUT":
-            return self._unknown
+            return self.not_understood(node)
         return self.fed_by(feed, socket, place, place)
 
     def _nothing(self) -> SurfaceSockets:
         return SurfaceSockets(BLACK)
 
     def _glow(self, socket: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> SurfaceSockets:
-        return SurfaceSockets(BLACK, _source(place, socket), glows=True)
+        return SurfaceSockets(BLACK, self.emitted(socket, place), glows=True)
 
     def _principled(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
-        emission, glows = _scaled(place, node.inputs["Emission Color"], node.inputs["Emission Strength"])
-        return SurfaceSockets(_source(place, node.inputs["Base Color"]), emission, _alpha(place, node), glows)
+        emission, glows = self._scaled(node, "Emission Color", "Emission Strength", place)
+        base, diffuse = self.reflected(node, node.inputs["Base Color"], place)
+        return SurfaceSockets(base, emission, _alpha(place, node), glows, diffuse)
 
     def _diffuse(
-        self, _: bpy.types.Node, color: bpy.types.NodeSocket, place: bpy.types.NodeTree
+        self, node: bpy.types.Node, color: bpy.types.NodeSocket, place: bpy.types.NodeTree
     ) -> SurfaceSockets:
-        return SurfaceSockets(_source(place, color))
+        base, diffuse = self.reflected(node, color, place)
+        return SurfaceSockets(base, diffuse=diffuse)
 
     def _emission(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
-        emission, glows = _scaled(place, node.inputs["Color"], node.inputs["Strength"])
+        emission, glows = self._scaled(node, "Color", "Strength", place)
         return SurfaceSockets(BLACK, emission, glows=glows)
 
     def _transparent(self, _: bpy.types.Node, __: bpy.types.NodeTree) -> SurfaceSockets:
@@ -120,19 +113,43 @@ class _SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
 
     def _mixed(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
         first, second = (self.shader(socket, place) for socket in node.inputs[1:3])
-        return _mixed(place, _source(place, node.inputs[0]), first, second)
+        return _mixed(place, source_of(place, node.inputs[0]), first, second)
 
     def _added(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
         first, second = (self.shader(socket, place) for socket in node.inputs[:2])
         return _added(place, first, second)
 
-    def not_understood(self, _: bpy.types.Node) -> SurfaceSockets:
+    def not_understood(self, _: bpy.types.Node, /) -> SurfaceSockets:
+        """Return what stands for other shaders: the constants of the whole material."""
         return self._unknown
+
+    def reflected(
+        self, node: bpy.types.Node, color: bpy.types.NodeSocket, place: bpy.types.NodeTree
+    ) -> tuple[ColorSource, ColorSource]:
+        """Return a shader's base color, from the input that takes it, and `diffuse` of the surface."""
+        del node
+        return source_of(place, color), BLACK
+
+    def emitted(self, color: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+        """Return the color of what glows, from the input that takes it."""
+        return source_of(place, color)
+
+    def _scaled(
+        self, node: bpy.types.Node, color: str, strength: str, place: bpy.types.NodeTree
+    ) -> tuple[bpy.types.NodeSocket, bool]:
+        """Return color × strength of two inputs, and whether it is not the constant 0."""
+        inputs = node.inputs[color], node.inputs[strength]
+        glows = all(_linked(socket) or default_rgb(socket).any() for socket in inputs)
+        scaled = place.nodes.new("ShaderNodeVectorMath")
+        scaled.operation = "SCALE"
+        place.links.new(self.emitted(inputs[0], place), scaled.inputs["Vector"])
+        place.links.new(source_of(place, inputs[1]), scaled.inputs["Scale"])
+        return scaled.outputs["Vector"], glows
 
     def _grouped(self, node: bpy.types.Node, identifier: str) -> SurfaceSockets:
         """Read a shader inside a node group, through outputs added to a copy of the group."""
         if not any(n.type == "GROUP_OUTPUT" and n.is_active_output for n in node.node_tree.nodes):
-            return self._unknown
+            return self.not_understood(node)
         if not is_copied_group(node.node_tree):
             group = node.node_tree.copy()
             mark_made(group)
@@ -157,7 +174,7 @@ class _SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
             outward(inner.emission, "Emission"),
             outward(inner.alpha, "Alpha"),
         )
-        return SurfaceSockets(base, emission, alpha, inner.glows)
+        return SurfaceSockets(base, emission, alpha, inner.glows, outward(inner.diffuse, "Diffuse Color"))
 
 
 def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:
@@ -165,10 +182,10 @@ def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:
     socket = node.inputs["Alpha"]
     if not socket.is_linked and socket.default_value in (0.0, 1.0):
         return float(socket.default_value)
-    return _source(tree, socket)
+    return source_of(tree, socket)
 
 
-def _source(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def source_of(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Return the output that feeds an input: where nothing does, that of a new node with its constant.
 
     The new node feeds the input too, unless muted links or nodes do in vain, or it is animated.
@@ -190,18 +207,6 @@ def _source(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types
     return output
 
 
-def _scaled(
-    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, strength: bpy.types.NodeSocket
-) -> tuple[bpy.types.NodeSocket, bool]:
-    """Return color × strength of two inputs, and whether it is not the constant 0."""
-    glows = all(_linked(socket) or default_rgb(socket).any() for socket in (color, strength))
-    node = tree.nodes.new("ShaderNodeVectorMath")
-    node.operation = "SCALE"
-    tree.links.new(_source(tree, color), node.inputs["Vector"])
-    tree.links.new(_source(tree, strength), node.inputs["Scale"])
-    return node.outputs["Vector"], glows
-
-
 def _linked(socket: bpy.types.NodeSocket) -> bool:
     """Whether something feeds a socket that is not a constant of ours."""
     node = feed_of(socket, enter_groups=False).node
@@ -213,23 +218,25 @@ def _mixed(
 ) -> SurfaceSockets:
     """Mix two surfaces; one that is wholly transparent lends no base color."""
     base = _mix_colors(tree, factor, first.base, second.base)
+    diffuse = _mix_colors(tree, factor, first.diffuse, second.diffuse)
     if first.alpha == 0.0:
-        base = second.base
+        base, diffuse = second.base, second.diffuse
     elif second.alpha == 0.0:
-        base = first.base
+        base, diffuse = first.base, first.diffuse
     emission = _mix_colors(tree, factor, first.emission, second.emission)
     alpha = _mix_floats(tree, factor, first.alpha, second.alpha)
-    return SurfaceSockets(base, emission, alpha, first.glows or second.glows)
+    return SurfaceSockets(base, emission, alpha, first.glows or second.glows, diffuse)
 
 
 def _added(tree: bpy.types.NodeTree, first: SurfaceSockets, second: SurfaceSockets) -> SurfaceSockets:
     """Add two surfaces, as a diffuse shader plus an emission; one opaque makes both opaque."""
     alpha = second.alpha if first.alpha == 0.0 else first.alpha
-    base, emission = (
+    base, emission, diffuse = (
         _add_colors(tree, first.base, second.base),
         _add_colors(tree, first.emission, second.emission),
+        _add_colors(tree, first.diffuse, second.diffuse),
     )
-    return SurfaceSockets(base, emission, alpha, first.glows or second.glows)
+    return SurfaceSockets(base, emission, alpha, first.glows or second.glows, diffuse)
 
 
 def _mix_colors(

@@ -6,7 +6,14 @@ from typing import Any
 
 import bpy
 
-from ..material_copies.copy_marks import COPY_MARKS, FOLLOWS, NODE_MARKS, VALUE, is_copied_group
+from ..material_copies.copy_marks import (
+    COPY_MARKS,
+    FOLLOWS,
+    NODE_MARKS,
+    VALUE,
+    behind_ours,
+    is_copied_group,
+)
 from ..material_copies.material_digest import (
     OUTPUTS_WITH_VALUES,
     animation_of,
@@ -68,14 +75,16 @@ def take_values(
 
 def _take(copied: bpy.types.NodeSocket, value: Any) -> None:
     """Set a copy's constant, and the node of ours that stands for it."""
-    if copied.is_linked:
-        node = copied.links[0].from_node
-        if node.get(VALUE) is not None:
-            node[VALUE] = list(value) if hasattr(value, "__len__") else [value]
-            _set(node.outputs[0], value)
-            _set(copied, value)
-    else:
-        _set(copied, value)
+    reader = behind_ours(copied)
+    if reader.is_linked:
+        node = reader.links[0].from_node
+        if node.get(VALUE) is None:
+            return
+        node[VALUE] = list(value) if hasattr(value, "__len__") else [value]
+        _set(node.outputs[0], value)
+    elif reader != copied:
+        _set(reader, value)
+    _set(copied, value)
 
 
 def _set(socket: bpy.types.NodeSocket, value: Any) -> None:

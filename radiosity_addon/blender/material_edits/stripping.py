@@ -6,7 +6,7 @@ import bpy
 
 from ..datablocks.bake_record import ORIGINAL, is_made
 from ..datablocks.keyed_paths import move_keys, path_of
-from ..images.node_group import BASE_COLOR, EMISSION, SHADER, SURFACE
+from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR, EMISSION, SHADER, SURFACE
 from ..material_copies.copy_marks import (
     COPY_MARKS,
     FED,
@@ -19,6 +19,7 @@ from ..material_copies.copy_marks import (
     is_added,
     is_copied_group,
     linked_output,
+    users_inputs,
 )
 from ..materials.shader_nodes import feed_of
 
@@ -92,21 +93,18 @@ def is_lightmap_node(node: bpy.types.Node) -> bool:
 
 def _reconnect(tree: bpy.types.NodeTree, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
     """Give an input of the user's what fed it before we put a node in between."""
-    node = source.node
+    node = _behind_mix(source.node)
     link = target.links[0]
-    if target.type == "SHADER":
-        node = _behind_mix(node)
-        before = node.inputs.get(SURFACE)
-        is_muted = None
-    else:
-        before = node.inputs[0] if node.get(THROUGH) else None
-        is_muted = link.is_muted
-    if before is None or not before.is_linked:
-        tree.links.remove(link)
-        return
-    inner = before.links[0]
-    muted = inner.is_muted if is_muted is None else is_muted
-    tree.links.new(inner.from_socket, target).is_muted = muted
+    is_muted = link.is_muted and not is_lightmap_node(node)
+    while is_added(node):
+        before = node.inputs[0] if node.get(THROUGH) or is_lightmap_node(node) else None
+        if before is None or not before.is_linked:
+            tree.links.remove(link)
+            return
+        inner = before.links[0]
+        is_muted = is_muted or inner.is_muted
+        node, source = inner.from_node, inner.from_socket
+    tree.links.new(source, target).is_muted = is_muted
 
 
 def _behind_mix(node: bpy.types.Node) -> bpy.types.Node:
@@ -119,7 +117,7 @@ def _behind_mix(node: bpy.types.Node) -> bpy.types.Node:
 def _put_value_back(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
     """Put the value of a node of ours into the socket it stands for; one used differently is the user's."""
     output = node.outputs[0]
-    targets = [link.to_socket for link in output.links if not is_added(link.to_node)]
+    targets = list(users_inputs(output))
     if len(targets) > 1 or any(target.type != output.type for target in targets):
         for mark in NODE_MARKS:
             node.pop(mark, None)
@@ -147,7 +145,8 @@ def _keep_overrides(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bool:
     complete = True
     for name, wanted, before, source_before in (
         (BASE_COLOR, base, constants[:4], sources[0]),
-        (EMISSION, color, constants[4:], sources[1]),
+        (EMISSION, color, constants[4:8], sources[1]),
+        *((DIFFUSE_COLOR, base, constants[8:], source) for source in sources[2:]),
     ):
         given = node.inputs[name]
         if given.is_linked and linked_output(given) == source_before:

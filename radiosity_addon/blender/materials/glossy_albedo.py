@@ -16,6 +16,8 @@ _WHITE_LOSS = 1.375
 """A white microfacet mirror without multiple scattering reflects 1 / (1 + 1.375 r^3.5)."""
 _GRAZING, _GRAZING_LOSS = 0.0446, 15.5
 """What Fresnel adds at grazing angles to one that is black face on, and its loss likewise."""
+_SEEN = ((3.0, 0.42, 7.5), (8.0, 0.58, 200.0))
+"""The same by the viewer's angle: powers of one minus its cosine, their factors if smooth, and losses."""
 _FRESNEL_OVER_SCHLICK = 1.07
 _FAINT = 0.003
 """Where F0 is not much more than this, there is less to add at grazing angles: none at 0."""
@@ -42,15 +44,39 @@ def dielectric(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scal
     ior: Index of refraction.
     level: Principled's Specular IOR Level: 0.5 leaves the reflection as the index says.
     """
+    total = _layer(algebra, ior, level, roughness, _grazing(algebra, roughness))
+    return algebra.saturate(algebra.calculate("MULTIPLY", total, _FRESNEL_OVER_SCHLICK))
+
+
+def dielectric_seen(
+    algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, away: Scalar
+) -> Scalar:
+    """Return the share of even light that what shines on a matte base reflects toward a viewer.
+
+    away: One minus the cosine of the viewer's angle.
+    """
+    parts = [
+        _falling(
+            algebra,
+            roughness,
+            algebra.calculate("MULTIPLY", algebra.calculate("POWER", away, power), smooth),
+            loss,
+        )
+        for power, smooth, loss in _SEEN
+    ]
+    return algebra.saturate(_layer(algebra, ior, level, roughness, algebra.calculate("ADD", *parts)))
+
+
+def _layer(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, grazing: Scalar) -> Scalar:
+    """Return what a dielectric reflects; `grazing` is what Fresnel adds to one that is black face on."""
     calculate = algebra.calculate
     ratio = calculate("DIVIDE", calculate("SUBTRACT", ior, 1.0), calculate("ADD", ior, 1.0))
     normal = calculate("MULTIPLY", calculate("MULTIPLY", ratio, ratio), calculate("MULTIPLY", level, 2.0))
     normal = algebra.saturate(normal)
     share = calculate("DIVIDE", normal, calculate("ADD", normal, _FAINT))
     share = calculate("MULTIPLY", share, algebra.complement(normal))
-    grazing = calculate("MULTIPLY", share, _grazing(algebra, roughness))
-    total = calculate("ADD", calculate("MULTIPLY", normal, _white(algebra, roughness)), grazing)
-    return algebra.saturate(calculate("MULTIPLY", total, _FRESNEL_OVER_SCHLICK))
+    added = calculate("MULTIPLY", share, grazing)
+    return calculate("ADD", calculate("MULTIPLY", normal, _white(algebra, roughness)), added)
 
 
 def _white(algebra: NodeAlgebra, roughness: Scalar) -> Scalar:
@@ -61,7 +87,7 @@ def _grazing(algebra: NodeAlgebra, roughness: Scalar) -> Scalar:
     return _falling(algebra, roughness, _GRAZING, _GRAZING_LOSS)
 
 
-def _falling(algebra: NodeAlgebra, roughness: Scalar, smooth: float, loss: float) -> Scalar:
+def _falling(algebra: NodeAlgebra, roughness: Scalar, smooth: Scalar, loss: float) -> Scalar:
     """Return smooth / (1 + loss · roughness^3.5)."""
     power = algebra.calculate("POWER", algebra.saturate(roughness), _EXPONENT)
     lost = algebra.calculate("ADD", algebra.calculate("MULTIPLY", power, loss), 1.0)

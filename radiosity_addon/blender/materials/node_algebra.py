@@ -19,6 +19,7 @@ _COMPUTE = {
     "MULTIPLY": lambda a, b: a * b,
     "DIVIDE": lambda a, b: a / b if b else 0.0,
     "POWER": lambda a, b: max(a, 0.0) ** b,
+    "MAXIMUM": lambda a, b: max(a, b),
 }
 
 

@@ -89,15 +89,11 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
             bpy.ops.object.mode_set(mode="EDIT")
 
     def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
-        from ..material_copies.lightmap_materials import set_lightmap_only
-
         look_for_interrupted(context)
 
         if in_window:
             show_result(context)
         report = self._report.as_dict()
-        if context.scene.radiosity.lightmap_only:
-            set_lightmap_only(True)
         taken = sum(report["seconds"].values())
         baked = {entry["object"] for entry in report["objects"]}
         glass = sum(name not in baked for name in report["solver"].get("glass", ()))
@@ -184,11 +180,15 @@ def show_folder(folder: str) -> None:
 
 
 def show_result(context: bpy.types.Context) -> None:
-    """Switch a viewport that shows no materials to the preview that does, if that is wanted."""
+    """Switch a viewport that shows no materials to the preview that does, if that is wanted.
+
+    It has the scene's lamps and world, for no other light is to shine on baked surfaces.
+    """
     space = context.space_data
     wanted = context.scene.radiosity.show_result
     if wanted and isinstance(space, bpy.types.SpaceView3D) and space.shading.type in {"WIREFRAME", "SOLID"}:
         space.shading.type = "MATERIAL"
+        space.shading.use_scene_lights = space.shading.use_scene_world = True
 
 
 CLASSES = (RADIOSITY_OT_bake, RADIOSITY_OT_restore, RADIOSITY_OT_add_cornell_box, RADIOSITY_OT_open_folder)

@@ -11,17 +11,20 @@ from .option_properties import OptionProperties, chosen_options, option_property
 from .preferences import memory_limit_of, threads_of
 
 
-def _show_lightmap_only(settings: RadiositySettings, _context: bpy.types.Context) -> None:
-    from ..material_copies.lightmap_materials import set_lightmap_only
+def _show(settings: RadiositySettings, _context: bpy.types.Context) -> None:
+    from ..material_copies.lightmap_materials import show_lightmaps
 
-    set_lightmap_only(settings.lightmap_only)
+    show_lightmaps(settings.show)
 
 
 class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
     """`scene.radiosity`: the options of the next bake, and a memory of the last one."""
 
-    lightmap_only: option_property(  # type: ignore[valid-type]
-        PANEL_OPTIONS["lightmap_only"], update=_show_lightmap_only
+    show: option_property(PANEL_OPTIONS["show"], update=_show)  # type: ignore[valid-type]
+    lightmap_only: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Lightmap Only",
+        description="What files of earlier versions have for Show",
+        options={"HIDDEN"},
     )
     baked_light: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Baked Light",
@@ -38,6 +41,21 @@ class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
         description="Figures and warnings of the last bake",
         options={"HIDDEN"},
     )
+
+
+def look_of(scene: bpy.types.Scene) -> str:
+    """Return how a scene shows its lightmaps; one without settings stays without."""
+    default = PANEL_OPTIONS["show"].default
+    return scene.radiosity.show if scene.is_property_set("radiosity") else str(default)
+
+
+def read_earlier(_: object = None) -> None:
+    """Take over what the open file has from an earlier version."""
+    for scene in bpy.data.scenes:
+        # Asking for its settings gives a scene some.
+        if scene.library is None and scene.is_property_set("radiosity") and scene.radiosity.lightmap_only:
+            scene.radiosity.property_unset("lightmap_only")
+            scene.radiosity.show = "lightmap"
 
 
 def settings_of(context: bpy.types.Context) -> BakeSettings:

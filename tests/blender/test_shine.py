@@ -1,0 +1,202 @@
+"""Baked materials keep their shine; what is diffuse comes from the lightmap, and from nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from radiosity_addon.blender.material_copies.copy_marks import behind_ours
+from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
+from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
+from tests.blender.edited_copies import (
+    EVERY,
+    GREEN,
+    Material,
+    color_node,
+    constant_of,
+    copy_of,
+    shader,
+)
+from tests.blender.hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
+from tests.blender.scenes import add_lamp, add_mesh, add_node, set_world, shader_material
+
+pytestmark = pytest.mark.usefixtures("record")
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+def painted(**inputs: object) -> Callable[[], Material]:
+    return lambda: principled_material(**inputs)
+
+
+LAYERED = {
+    "rough": painted(Roughness=0.9),
+    "smooth": painted(Roughness=0.1),
+    "dense": painted(IOR=2.0, Roughness=0.2),
+    "coat": painted(Coat_Weight=1.0),
+    "colored coat": painted(Coat_Weight=1.0, Coat_Tint=(1.0, 0.5, 0.2, 1.0)),
+    "metal": painted(Metallic=1.0, Roughness=0.3),
+    "subsurface metal": painted(Subsurface_Weight=1.0, Metallic=1.0),
+}
+NOT_PARTED = {"grouped", "muted link", "no output", "glass", "half a metal"}
+"""Those that stay matte, that are black, and that are part of both."""
+
+DIFFUSE = {
+    "no specular": painted(Specular_IOR_Level=0.0),
+    "nor alpha": painted(Specular_IOR_Level=0.0, Alpha=0.5),
+    "nor darkness": painted(Specular_IOR_Level=0.0, Emission_Strength=2.0, Subsurface_Weight=0.5),
+    "translucent": lambda: shader_material("M", "ShaderNodeBsdfTranslucent", Color=GREEN),
+    "subsurface": lambda: shader_material("M", "ShaderNodeSubsurfaceScattering", Color=GREEN),
+    "toon": lambda: shader_material("M", "ShaderNodeBsdfToon", Color=GREEN),
+    **{kind: EVERY[kind] for kind in ("diffuse", "emission", "mixed", "added", "cut out", "bare color")},
+    **{kind: EVERY[kind] for kind in ("grouped", "group", "one group twice", "color at the output")},
+}
+
+
+def lit(folder: Path) -> np.ndarray:
+    """What is seen in the light of a lamp and nothing else."""
+    bpy.context.scene.world = None
+    lamp = add_lamp("POINT", energy=5000.0, transform={"location": (0.3, 0.2, 2.0)})
+    seen = seen_from_above(folder)
+    bpy.data.objects.remove(lamp)
+    return seen
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize("kind", [kind for kind in {**EVERY, **LAYERED} if kind not in NOT_PARTED])
+def test_in_even_light_a_baked_material_looks_as_it_does_unbaked(kind: str, tmp_path: Path) -> None:
+    """All light is 1, so that Cycles' own render is the albedo seen from above plus emission."""
+    add_plane(material={**EVERY, **LAYERED}[kind]())
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    np.testing.assert_allclose(
+        seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1)), expected, rtol=0.02
+    )
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize("degrees", [45, 60, 75])
+@pytest.mark.parametrize("kind", ["rough", "smooth", "principled", "coat", "metal"])
+def test_in_even_light_it_looks_so_from_the_side(kind: str, degrees: int, tmp_path: Path) -> None:
+    plane = add_plane(material={**EVERY, **LAYERED}[kind]())
+    plane.rotation_euler.x, plane.scale = np.radians(degrees), (9.0, 9.0, 9.0)
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    np.testing.assert_allclose(
+        seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1)), expected, rtol=0.02
+    )
+
+
+@pytest.mark.parametrize("kind", DIFFUSE)
+def test_lamps_add_nothing_to_what_is_diffuse(kind: str, tmp_path: Path) -> None:
+    add_plane(material=DIFFUSE[kind]())
+    bake_by_hand(show="shine")
+    np.testing.assert_array_equal(lit(tmp_path), seen_from_above(tmp_path))
+
+
+def test_a_lamp_makes_a_highlight_unless_shown_matte(tmp_path: Path) -> None:
+    add_plane(material=principled_material(Roughness=0.1))
+    bake_by_hand(show="shine")
+    assert (lit(tmp_path) > seen_from_above(tmp_path)).all()
+    for look in ("matte", "lightmap"):
+        show_lightmaps(look)
+        np.testing.assert_array_equal(lit(tmp_path), seen_from_above(tmp_path))
+
+
+@pytest.mark.parametrize("quantity", ["radiosity", "residual"])
+def test_what_holds_reflected_light_stays_matte(quantity: str, tmp_path: Path) -> None:
+    add_plane(material=principled_material(Roughness=0.1))
+    bake_by_hand(quantity=quantity)
+    matte = seen_from_above(tmp_path)
+    show_lightmaps("shine")
+    np.testing.assert_array_equal(lit(tmp_path), matte)
+
+
+def test_a_mirror_shows_its_baked_surroundings(tmp_path: Path) -> None:
+    """The ceiling's base color × lightmap, in the mirror's color."""
+    add_plane(material=principled_material(name="Mirror", Metallic=1.0, Roughness=0.0))
+    ceiling = [(-9, -9, 9), (-9, 9, 9), (9, 9, 9), (9, -9, 9)]
+    add_mesh("Ceiling", ceiling, material=shader_material("M", "ShaderNodeBsdfDiffuse", Color=GREEN))
+    bake_by_hand(show="shine")
+    expected = np.multiply(BASE, np.multiply(GREEN[:3], TEXEL))
+    np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], expected, rtol=2e-3)
+
+
+def test_a_normal_map_turns_the_highlight(tmp_path: Path) -> None:
+    """It shows what the turned surface mirrors, at 45°."""
+    material = principled_material(Metallic=1.0, Roughness=0.0)
+    add_plane(material=material)
+    turned = add_mesh("Wall", [(1e3, -1e3, -1e3), (1e3, 1e3, -1e3), (1e3, 1e3, 1e3), (1e3, -1e3, 1e3)])
+    turned.data.materials.append(shader_material("W", "ShaderNodeBsdfDiffuse", Color=(*WHITE, 1.0)))
+    bake_by_hand(show="shine")
+    assert seen_from_above(tmp_path).max() == 0.0
+    tree = material.node_tree
+    normal = tree.nodes.new("ShaderNodeCombineXYZ")
+    normal.inputs["X"].default_value = normal.inputs["Z"].default_value = 0.5**0.5
+    tree.links.new(normal.outputs[0], shader(material).inputs["Normal"])
+    bake_by_hand(show="shine")
+    mirrored = np.add(BASE, np.subtract(1.0, BASE) * (1.0 - 0.5**0.5) ** 5)
+    np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(mirrored, TEXEL), rtol=1e-3)
+
+
+def other_color(copy: Material) -> None:
+    color_node(copy).default_value = GREEN
+
+
+def other_texture(copy: Material) -> None:
+    """Where the panel shows the color: a node in its place."""
+    source = add_node(copy.node_tree, "ShaderNodeBrightContrast", Color=GREEN)
+    copy.node_tree.links.new(source.outputs[0], behind_ours(shader(copy).inputs["Base Color"]))
+
+
+def turn_to_metal(copy: Material) -> None:
+    constant_of(shader(copy).inputs["Metallic"]).default_value = 1.0
+
+
+def glow(copy: Material) -> None:
+    constant_of(shader(copy).inputs["Emission Strength"]).default_value = 2.0
+
+
+def bump(copy: Material) -> None:
+    normal = copy.node_tree.nodes.new("ShaderNodeBump")
+    copy.node_tree.links.new(normal.outputs[0], shader(copy).inputs["Normal"])
+
+
+def polish(copy: Material) -> None:
+    shader(copy).inputs["Coat Roughness"].default_value = 0.25
+
+
+@pytest.mark.parametrize("edit", [other_color, other_texture, turn_to_metal, glow, bump, polish])
+def test_an_edit_shows_at_once_as_after_another_bake(
+    edit: Callable[[Material], None], tmp_path: Path
+) -> None:
+    paint = principled_material(Coat_Weight=0.25)
+    add_plane(material=paint)
+    set_world(*WHITE)
+    bake_by_hand(show="shine")
+    before = seen_from_above(tmp_path)
+    edit(copy_of(paint))
+    at_once = seen_from_above(tmp_path)
+    assert edit in (bump, polish) or not np.allclose(at_once, before, rtol=0.02)
+    assert carry_material_edits() == ()
+    bake_by_hand(show="shine")
+    np.testing.assert_allclose(seen_from_above(tmp_path), at_once, rtol=2e-3)
+
+
+def test_materials_of_an_earlier_version_stay_matte(tmp_path: Path) -> None:
+    if bpy.app.version < (5, 0):
+        pytest.skip("the file is one of Blender 5.0")
+    earlier = Path(__file__).parent / "files" / "lightmaps_without_records.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(earlier))
+    matte = lit(tmp_path)
+    assert matte.any()
+    show_lightmaps("shine")
+    np.testing.assert_array_equal(lit(tmp_path), matte)
+    show_lightmaps("lightmap")
+    assert not np.array_equal(lit(tmp_path), matte)
