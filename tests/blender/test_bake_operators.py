@@ -199,6 +199,18 @@ def test_what_is_shown_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
         assert shown() == {chosen}
 
 
+def test_all_scenes_of_a_file_say_what_is_shown(box: bpy.types.Scene) -> None:
+    """Materials are of the file: no scene may say something else than what they show."""
+    second = bpy.data.scenes.new("Second")
+    second.radiosity.show = "matte"
+    assert box.radiosity.show == "matte"
+    box.radiosity.show = "lightmap"
+    assert second.radiosity.show == "lightmap"
+    third = bpy.data.scenes.new("Third")
+    bake()
+    assert third.radiosity.show == "lightmap"
+
+
 def test_undo_of_another_look_brings_the_earlier_one_back(box: bpy.types.Scene) -> None:
     def seen() -> tuple[str, str]:
         (tree,) = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]

@@ -9,9 +9,12 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.blender.files.files import empty_scene
 from radiosity_addon.blender.material_copies.copy_marks import behind_ours
 from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options import BakeSettings
 from tests.blender.edited_copies import (
     EVERY,
     GREEN,
@@ -21,7 +24,15 @@ from tests.blender.edited_copies import (
     copy_of,
     shader,
 )
-from tests.blender.hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
+from tests.blender.hand_bake import (
+    BASE,
+    SMALL,
+    TEXEL,
+    add_plane,
+    bake_by_hand,
+    principled_material,
+    seen_from_above,
+)
 from tests.blender.scenes import add_lamp, add_mesh, add_node, set_world, shader_material
 
 pytestmark = pytest.mark.usefixtures("record")
@@ -200,3 +211,20 @@ def test_materials_of_an_earlier_version_stay_matte(tmp_path: Path) -> None:
     np.testing.assert_array_equal(lit(tmp_path), matte)
     show_lightmaps("lightmap")
     assert not np.array_equal(lit(tmp_path), matte)
+
+
+def test_objects_linked_from_a_baked_file_are_exported_as_they_were(tmp_path: Path) -> None:
+    """Their copies of materials are another file's, and cannot be taken off; nor are they lamps."""
+    add_plane(material=principled_material())
+    plain = export_scene(bpy.context, BakeSettings(resolution=SMALL)).bake_scene.scene
+    bake_by_hand()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    empty_scene()
+    with bpy.data.libraries.load(str(tmp_path / "baked.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Plane"]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    add_plane("Local", shader_material("Other", "ShaderNodeBsdfDiffuse"))
+    both = export_scene(bpy.context, BakeSettings(resolution=SMALL)).bake_scene
+    linked = next(item for item in both.objects if not item.bake)
+    np.testing.assert_array_equal(both.scene.reflectance[linked.rows], plain.reflectance)
+    assert not both.scene.emission.any()

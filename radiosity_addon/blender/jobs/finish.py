@@ -29,11 +29,10 @@ from ..files.saved_files import save_copy
 from ..images.group_images import GroupImages, each_image, write_groups
 from ..images.images import lightmap_files, relative_path, set_folder, write_pages
 from ..material_copies.light_shares import crowded_materials
-from ..material_copies.lightmap_materials import show_lightmaps
 from ..relight import kept_bakes, lightmap_versions
 from ..scene_records.export_sources import Export
 from ..session import kept_details, last_bake
-from ..settings.properties import look_of
+from ..settings.properties import show_look_of
 from .preview import SAMPLES, render_preview
 
 BakeJob = Generator[Status, None, BakeReport]
@@ -219,7 +218,7 @@ def _show(
         if keeping is not None:
             kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
         behind = yield from apply_steps(context, export, result, images, settings, groups, earlier)
-        show_lightmaps(look_of(context.scene))
+        show_look_of(context.scene)
     except BaseException:
         remove_datablocks([*images, *each_image(groups)])
         raise

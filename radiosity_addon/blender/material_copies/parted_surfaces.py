@@ -79,7 +79,7 @@ def _part(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.N
         source_of(tree, socket)
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = shine_group()
-    node.name = node.label = node.node_tree.name
+    node.name, node.label = node.node_tree.name, f"{node.node_tree.name}: {socket.name}"
     node.location = (socket.node.location.x - 200, socket.node.location.y)
     node[THROUGH] = True
     if is_color:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import bpy
 import numpy as np
 
+from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.mesh_arrays import same_polygons
 from .export_sources import ExportSource
 from .render_state import render_depsgraph
@@ -125,7 +126,13 @@ def materials_of(instance: bpy.types.DepsgraphObjectInstance) -> list[bpy.types.
             own.append(slot.material)
         elif slot.link == "OBJECT":
             own[index] = slot.material
-    return own
+    return [_read_material(material) for material in own]
+
+
+def _read_material(material: bpy.types.Material | None) -> bpy.types.Material | None:
+    """Return the original of a copy that shows a lightmap: copies in linked files cannot be taken off."""
+    original = None if material is None or material.library is None else material.get(ORIGINAL)
+    return material if original is None else original
 
 
 def source_of(instance: bpy.types.DepsgraphObjectInstance, name: str, makes_instances: bool) -> ExportSource:

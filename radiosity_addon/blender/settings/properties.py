@@ -12,9 +12,7 @@ from .preferences import memory_limit_of, threads_of
 
 
 def _show(settings: RadiositySettings, _context: bpy.types.Context) -> None:
-    from ..material_copies.lightmap_materials import show_lightmaps
-
-    show_lightmaps(settings.show)
+    show_look_of(settings.id_data)
 
 
 class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
@@ -47,6 +45,17 @@ def look_of(scene: bpy.types.Scene) -> str:
     """Return how a scene shows its lightmaps; one without settings stays without."""
     default = PANEL_OPTIONS["show"].default
     return scene.radiosity.show if scene.is_property_set("radiosity") else str(default)
+
+
+def show_look_of(scene: bpy.types.Scene) -> None:
+    """Show all lightmaps of the file as a scene asks; its other scenes say the same from then on."""
+    from ..material_copies.lightmap_materials import show_lightmaps
+
+    look = look_of(scene)
+    show_lightmaps(look)
+    for other in bpy.data.scenes:
+        if other.library is None and look_of(other) != look:
+            other.radiosity.show = look
 
 
 def read_earlier(_: object = None) -> None:
