@@ -111,16 +111,21 @@ def test_cells_of_the_pixel_answer_hits_beyond_the_texels_triangle() -> None:
     assert np.abs(apart).max() < 1.0 / ALONG
 
 
-def test_texels_below_a_hood_answer_in_cells() -> None:
-    """In a gap light fades within a few heights: the middle of a texel does not stand for its rim."""
-    low = 3.0
-    slab = rectangle((low / SIZE, -1, 0.05 / SIZE), (0, 3, 0), (4 / SIZE, 0, 0))
+def test_texels_at_the_rim_of_a_gap_answer_in_cells() -> None:
+    """There light fades within a few heights of the gap; farther in, texels answer as a whole."""
+    slab = rectangle((1 / SIZE, -1, 0.05 / SIZE), (0, 3, 0), (6 / SIZE, 0, 0))
     cells, geometry = cells_of(slab)
-    x = np.linspace(4.02, 5.98, 40)
-    hits = on_floor(x / SIZE, np.full(40, 2.3) / SIZE)
-    cell = cells.at(geometry.texel_at(hits), hits)
+    row, column = geometry.row[cells.texel], geometry.column[cells.texel]
+    assert not ((column > 2) & (column < 5) & (row > 0) & (row < SIZE - 1)).any()
+    assert set(zip(row.tolist(), column.tolist(), strict=True)) >= {(0, 3), (0, 4), (7, 3), (7, 4)}
+    x = np.linspace(1.02, 2.98, 40)
+    hits = on_floor(x / SIZE, np.full(40, 5.3) / SIZE)
+    texel = geometry.texel_at(hits)
+    at_rim = np.isin(texel, cells.texel)
+    assert at_rim.sum() >= 20
+    cell = cells.at(texel[at_rim], hits.take(at_rim))
     assert (cell != NOTHING).all()
-    assert np.abs(cells.footprints(cell).points[:, 0] * SIZE - x).max() < 1.0 / ALONG
+    assert np.abs(cells.footprints(cell).points[:, 0] * SIZE - x[at_rim]).max() < 1.0 / ALONG
 
 
 def test_light_on_one_side_does_not_reach_the_other() -> None:

@@ -7,7 +7,7 @@ frame is darker than what lies a texel farther in the open. So a divided texel a
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`element_cells.py` does the same for elements).
 Through a gap the line of sight is free: what is below a hood asks what is below it, the rest what is not.
-Texels below a hood answer in cells as well, for in a gap light fades within a few heights.
+So do texels at the rim of a gap, all of them below a hood: there light fades within a few heights.
 
 A texel shows one triangle, but its pixel may lie on others too, whose part may be below a hood or behind a
 wall where the texel's is not. Hits there ask cells of the whole pixel.
@@ -57,12 +57,12 @@ _SPOTS = _FIRST + ANCHOR / ALONG
 class TexelCells:
     """The cells of some texels, numbered texel by texel.
 
-    crossings: Those have cells that are crossed, touched or occluded.
+    crossings: Those have cells that are crossed or touched, or where light fades in a gap.
     """
 
     def __init__(self, elements: ElementLookup, geometry: TexelGeometry, crossings: Crossings) -> None:
         self.elements, self._geometry = elements, geometry
-        self._rim, divided = crossings.rim, crossings.alone | crossings.touched
+        self._rim, divided = crossings.rim, crossings.crossed | crossings.fading | crossings.touched
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
         self._divided = divided

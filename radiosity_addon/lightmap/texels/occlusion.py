@@ -21,7 +21,7 @@ from ...numerics import Array, fill_chunks, row_numbers
 from ...rays import SIGHT_LIFT, RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
-from .texel_geometry import TexelGeometry
+from .texel_geometry import NO_TEXEL, TexelGeometry
 
 CHUNK = 1 << 14
 """Texels tested at once; bounds the temporaries to about 60 MB."""
@@ -76,6 +76,18 @@ class Crossings:
     def alone(self) -> Array:
         """Texels whose light differs from their neighbors' even where they see each other."""
         return self.crossed | self.occluded
+
+    @cached_property
+    def fading(self) -> Array:
+        """Occluded texels at the rim of a gap or of a chart, where light fades over less than a texel."""
+        inner = np.zeros(len(self.occluded), dtype=bool)
+        for numbers in self.geometry.index:
+            dark, there = np.zeros(np.add(numbers.shape, 2), dtype=bool), numbers != NO_TEXEL
+            dark[1:-1, 1:-1][there] = self.occluded[numbers[there]]
+            around = dark[:-2] & dark[1:-1] & dark[2:]
+            around = around[:, :-2] & around[:, 1:-1] & around[:, 2:]
+            inner[numbers[around]] = True
+        return np.asarray(self.occluded & ~inner)
 
     @cached_property
     def next_to_crossed(self) -> Array:

@@ -41,6 +41,7 @@ class HitTable:
         self.first_small = self.texel_count + local.elements.hierarchy.n_elements
         self.first_cell = self.texel_count + len(self.element_cells)
         self.end = self.first_cell + len(self.texel_cells)
+        self._in_cells = crossings.crossed | crossings.fading
         self._wide = geometry.texel_area > (WIDE_TEXEL * geometry.texel_size) ** 2
 
     def number(self, hits: Hits) -> Array:
@@ -48,7 +49,7 @@ class HitTable:
         geometry, elements = self.geometry, self.local.elements
         texel = geometry.texel_at(hits)
         found = texel.copy()
-        divided = np.flatnonzero((texel != NO_TEXEL) & self.crossings.alone[texel])
+        divided = np.flatnonzero((texel != NO_TEXEL) & self._in_cells[texel])
         # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
         touched = np.flatnonzero((texel != NO_TEXEL) & self.crossings.touched[texel])
         apart = touched[~self._sees_center(texel[touched], hits.take(touched))]
