@@ -47,6 +47,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.slow)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes() -> None:
+    """Keep from workers what Blender's module has set in this process, if a folder's conftest.py imported it.
+
+    5.2 sets OCIO behind Python's back: `os.environ` does not know it. Processes that find it set say so.
+    """
+    if "OCIO" not in os.environ:
+        os.unsetenv("OCIO")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session: pytest.Session) -> None:
     session.config.stash[_SESSION] = session

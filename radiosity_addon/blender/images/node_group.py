@@ -9,7 +9,6 @@ from typing import Any
 import bpy
 
 from ..datablocks.bake_record import is_made, mark_made
-from ..materials.node_algebra import NodeAlgebra
 
 GROUP_NAME = "Radiosity Lightmap"
 
@@ -159,6 +158,8 @@ def _build(tree: bpy.types.NodeTree, shines: bool, see_through: bool) -> None:
         return
     diffuse = combined("ADD", combined("MULTIPLY", light, given[DIFFUSE_COLOR], 2, -2), glow, 3, -2)
     if see_through:
+        from ..materials.node_algebra import NodeAlgebra
+
         diffuse = combined("SCALE", diffuse, NodeAlgebra(tree).saturate(given[ALPHA]), 4, -2)
     whole = _place(tree.nodes.new("ShaderNodeAddShader"), 6, -2)
     whole.name = SHINE
