@@ -266,3 +266,37 @@ def test_the_binary_files_have_the_lengths_they_say(run: Run, folder: Path) -> N
     for name in ("scene.glb", "scene_baked.glb"):
         data = (folder / "export" / name).read_bytes()
         assert struct.unpack_from("<4sII", data) == (b"glTF", 2, len(data))
+
+
+def test_what_was_edited_since_the_bake_is_named(run: Run, folder: Path) -> None:
+    def said() -> list[str]:
+        done = run("export", folder, "--forms", "glb")
+        assert done.code == 0
+        return [line for line in done.out.splitlines() if line.startswith("note: ")]
+
+    assert not [note for note in said() if "since" in note]
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "baked.blend"))
+    bpy.context.scene["mine"] = 1  # nothing that light depends on
+    save(folder / "baked.blend")
+    assert [note for note in said() if "since" in note] == [
+        "note: baked.blend was changed since it was baked: it is exported as it is"
+    ]
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "baked.blend"))
+    bpy.data.objects["Cube"].location.x += 0.5
+    tree = bpy.data.materials["Red"].node_tree
+    shader = next(node for node in tree.nodes if node.type.startswith("BSDF"))
+    shader.inputs[0].default_value = (0.1, 0.2, 0.8, 1.0)
+    bpy.data.meshes["Floor"].vertices[0].co.z += 0.3
+    save(folder / "baked.blend")
+    (note,) = [note for note in said() if "since the last bake" in note]
+    assert note == (
+        "note: changed since the last bake: 'Floor', 'Wall', 'Cube'; "
+        "the lightmaps show their light of before: bake again"
+    )
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "baked.blend"))
+    bpy.data.objects.remove(bpy.data.objects["Wall"])
+    save(folder / "baked.blend")
+    (note,) = [note for note in said() if "since the last bake" in note]
+    assert note.startswith(
+        "note: removed since the last bake: 'Wall'; changed since the last bake: 'Floor', 'Cube'; "
+    )

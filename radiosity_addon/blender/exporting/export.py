@@ -16,7 +16,7 @@ import addon_utils  # type: ignore[import-not-found]
 import bpy
 
 from ...bake.result import BakeReport
-from ...base import BakeError, Status
+from ...base import BakeError, Status, staged
 from ...exports import (
     INDEX_NAME,
     Glb,
@@ -42,6 +42,7 @@ from ...options import EFFICACY, ENGINE_PADDING, Form
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
 from .bake_units import bake_units
+from .edits_since_bake import edits_since_bake
 from .evaluated_colors import evaluate_channel, image_of, side_factor
 from .export_materials import ALPHA, BASE, CHANNELS, EMISSION
 from .export_scene import PREFIX, ExportScene, export_scene, lamps_in
@@ -67,11 +68,19 @@ def foreseen_files(form: Form) -> list[str]:
 
 
 def run_export(
-    context: bpy.types.Context, form: Form, folder: OutputFolder, lightmaps: Mapping[str, str]
+    context: bpy.types.Context,
+    form: Form,
+    folder: OutputFolder,
+    lightmaps: Mapping[str, str],
+    *,
+    compare: bool = True,
+    in_background: bool = False,
 ) -> Generator[Status, None, ExportReport]:
     """Export the context's scene into a folder; all files are there at once, or none.
 
     lightmaps: Digests of the files of the lightmaps that are shown, for the report.
+    compare: Whether the scene may have been edited since the bake: the report says what was.
+    in_background: Whether a window waits.
 
     Raises
     ------
@@ -82,6 +91,9 @@ def run_export(
         output.expect(foreseen_files(form))
         files = static_files(form)
         yield Status("export", 0.0)
+        edits: list[str] = []
+        if compare:
+            edits = yield from staged(edits_since_bake(context, in_background), "compare", 0.0, 0.1)
         with closing(export_scene(context)) as scene:
             light = _Lightmaps.of(scene, sum_groups=form.sum_groups)
             output.expect(light.file_names)
@@ -117,7 +129,7 @@ def run_export(
         output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
         output.publish()
         older = [f"{name} is of earlier lightmaps" for name in older_files(record, output.path)]
-    return ExportReport(tuple(sorted(files)), (*light.notes, *older))
+    return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *older))
 
 
 @dataclass(frozen=True, eq=False)
