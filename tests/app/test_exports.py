@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
-from radiosity_addon.exports import Glb, read_half_exr, read_ktx2
+from radiosity_addon.exports import Glb, decode_rgbm, read_half_exr, read_ktx2
 from radiosity_addon.files import is_outdated, lightmap_digests
 
 from .conftest import QUICK, Baked, read_pixels, read_report, save
@@ -43,6 +43,7 @@ def test_each_form_makes_its_files(run: Run, folder: Path) -> None:
         ("glb", GLB),
         ("web", GLB | {"viewer.html", "three-lightmap.js"}),
         ("godot,unity,bevy", BASE | scripts),
+        ("rgbm", BASE | {"lightmap_rgbm.png"}),
     ):
         shutil.rmtree(folder / "export", ignore_errors=True)
         done = run("export", folder, "--forms", forms)
@@ -59,6 +60,27 @@ def test_the_lightmap_is_that_of_the_bake(run: Run, folder: Path) -> None:
     np.testing.assert_allclose(exr, exact, rtol=2**-11, atol=2**-25)
     ktx2 = read_ktx2((folder / "export" / "lightmap.ktx2").read_bytes())
     assert (np.abs(ktx2 - exact).max(axis=-1) <= exact.max(axis=-1) / 512 + 1e-12).all()
+
+
+def test_rgbm_is_the_lightmap_too(run: Run, folder: Path) -> None:
+    assert run("export", folder, "--forms", "rgbm", "--quiet").code == 0
+    index = json.loads((folder / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    (page,) = index["pages"]
+    assert page["rgbm"] == "lightmap_rgbm.png"
+    assert "rgbm_range" in index["encodings"]["rgbm"]
+    image = bpy.data.images.load(str(folder / "export" / page["rgbm"]))
+    image.colorspace_settings.name, image.alpha_mode = "Non-Color", "CHANNEL_PACKED"
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    encoded = np.rint(255.0 * pixels).reshape(page["height"], page["width"], 4)
+    found = decode_rgbm(encoded, page["rgbm_range"])
+    exact = read_pixels(folder / "lightmap.exr")[..., :3]
+    brightest = np.maximum(exact.max(axis=-1), page["rgbm_range"] / 255)
+    assert (np.abs(found - exact).max(axis=-1) <= brightest / 255 * 1.0001).all()
+
+    assert run("export", folder, "--forms", "glb", "--quiet").code == 0
+    index = json.loads((folder / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    assert "rgbm" not in json.dumps(index)
 
 
 def test_the_same_bake_gives_the_same_export(run: Run, folder: Path) -> None:

@@ -20,7 +20,7 @@ def edits_since_bake(
 ) -> Generator[float, None, list[str]]:
     """Compare the context's scene with what it remembers of its bake; returns what to note.
 
-    As *Changed* does. Lamps are not compared: the digest of their light is one with that of the bake's settings.
+    As *Changed* does, but for lamps: the digest of their light is one with that of the bake's settings.
     Yields fraction: As `export_steps`.
     """
     objects = json.loads(context.scene.radiosity.baked_objects or "{}")
