@@ -8,6 +8,7 @@ on them are not renewed.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
@@ -86,6 +87,10 @@ class BakeDigests(NamedTuple):
     def of(cls, bake_scene: BakeScene, settings: BakeSettings) -> BakeDigests:
         """Return the digests of a scene."""
         objects = {item.name: rounded_digest(bake_scene, item) for item in bake_scene.objects}
+        for item in bake_scene.objects:
+            if item.level is not None and item.level.base in objects:  # shows its lightmap
+                both = objects[item.level.base] + objects[item.name]
+                objects[item.level.base] = hashlib.sha256(both.encode()).hexdigest()
         return cls(light_digest(bake_scene, settings), objects)
 
     def as_before(self, shown: ShownBake, names: Collection[str]) -> BakeDigests:

@@ -28,6 +28,7 @@ from ..scene_records.render_options import option_warnings, world_of
 from ..scene_records.render_state import leave_edit_mode, render_depsgraph
 from ..session.background import elsewhere
 from .collect import collect_steps
+from .levels_of_detail import level_of_detail
 
 T = TypeVar("T")
 
@@ -76,8 +77,10 @@ def export_steps(
     check_names(context, collected.pieces, settings)
     chosen = chosen_pieces(context, collected.pieces, settings.objects)
     check_pages(chosen, settings)
-    for piece in chosen:
-        _check_uv_layers(piece)
+    bases = {piece.source.name for piece in chosen}
+    for piece in collected.pieces:
+        if piece.source.name in bases or (piece.level is not None and piece.level.base in bases):
+            _check_uv_layers(piece)
     yield 0.5
     background = world_of(context)
     group = group_on(background, blender_groups(context.scene))
@@ -133,6 +136,7 @@ def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) ->
                 uv=None if uv is None else np.ascontiguousarray(uv[:, order]),
                 texel_scale=piece.role.texel_scale,
                 page=piece.role.page,
+                level=level_of_detail(piece),
             )
         )
         in_bounces.append(np.full(len(mesh), piece.role.in_bounces))
@@ -304,7 +308,8 @@ def chosen_pieces(
         return bakeable
     chosen: list[Piece] = []
     for name in names:
-        named = [piece for piece in pieces if name in piece.names]
+        asked = {level.base for piece in pieces if (level := piece.level) is not None and name in piece.names}
+        named = [piece for piece in pieces if name in piece.names or piece.source.name in asked]
         bakeable = [piece for piece in named if piece.bakeable]
         if not bakeable:
             linked = [piece for piece in named if piece.linked]
