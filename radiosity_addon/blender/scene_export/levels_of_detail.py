@@ -7,6 +7,7 @@ block, and get its lightmap's coordinates (`bake/levels.py`).
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +53,18 @@ def share_levels(contents: SceneContents) -> None:
                 f"{names} {'shows' if len(coarser) == 1 else 'show'} the lightmap of '{base.source.name}'"
             )
             contents.warnings.append(BakeWarning(base.source.name, f"levels of detail by name: {message}"))
+
+
+def with_levels(chosen: Sequence[Piece], pieces: Sequence[Piece]) -> list[Piece]:
+    """Return chosen pieces, and all coarser levels of them."""
+    bases = {piece.source.name for piece in chosen}
+    return [*chosen, *(piece for piece in pieces if piece.level is not None and piece.level.base in bases)]
+
+
+def pieces_named(pieces: Sequence[Piece], name: str) -> list[Piece]:
+    """Return the pieces that a user calls so; a coarser level stands for the finest one."""
+    bases = {piece.level.base for piece in pieces if piece.level is not None and name in piece.names}
+    return [piece for piece in pieces if name in piece.names or piece.source.name in bases]
 
 
 def _is_many(piece: Piece) -> bool:

@@ -22,8 +22,8 @@ __all__ = [
     "assign_pages",
     "build_atlas",
     "greedy_object",
-    "uvs_of_level",
     "padding_for",
     "page_size",
     "share_of",
+    "uvs_of_level",
 ]

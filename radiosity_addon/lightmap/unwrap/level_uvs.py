@@ -9,9 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array, TriangleTree, connected_faces, double_area_vectors, numbered
+from ...rays import EmbreeCaster
 
 TURNED = 0.05
-"""Of the object's size: a surface at right angles seems as much farther. Thin things have two sides."""
+"""Of the object's size: a surface at right angles seems as much farther, for thin things have two sides; and
+surfaces are looked for as far in front of a level and behind it."""
+
+_SAMPLES = np.array(
+    [
+        *([1 / 3] * 3, [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]),
+        *([0.45, 0.45, 0.1], [0.45, 0.1, 0.45], [0.1, 0.45, 0.45]),
+    ]
+)
+"""Where it is looked which chart a triangle is nearest to: weights of its corners."""
 
 
 def uvs_of_level(triangles: Array, polygon: Array, base: Array, base_uv: Array) -> Array:
@@ -24,7 +34,7 @@ def uvs_of_level(triangles: Array, polygon: Array, base: Array, base_uv: Array) 
     """
     uv = np.zeros((len(triangles), 3, 2), dtype=np.float32)
     chart = charts(base, base_uv)
-    wanted = chart[_nearest_to_polygons(triangles, polygon, base)]
+    wanted = _chart_of_polygons(triangles, polygon, base, chart)
     rows = np.argsort(wanted, kind="stable")
     first = np.flatnonzero(np.diff(wanted[rows], prepend=-1))
     members = np.argsort(chart, kind="stable")
@@ -43,19 +53,27 @@ def charts(triangles: Array, uv: Array) -> Array:
     return connected_faces(numbered(corners).reshape(-1, 3))
 
 
-def _nearest_to_polygons(triangles: Array, polygon: Array, base: Array) -> Array:
-    """Return (t,) the triangle of `base` that is nearest to the middle of each triangle's polygon."""
+def _chart_of_polygons(triangles: Array, polygon: Array, base: Array, chart: Array) -> Array:
+    """Return (t,) the chart that most of each triangle's polygon is nearest to."""
     number = numbered(polygon)
     vectors = double_area_vectors(triangles)
-    area = np.maximum(np.linalg.norm(vectors, axis=1), 1e-30)
-    total = np.bincount(number, weights=area)
-    middle, normal = (
-        np.stack([np.bincount(number, weights=values[:, axis]) for axis in range(3)], axis=1)
-        for values in (area[:, None] * triangles.mean(axis=1), vectors)
-    )
-    middle = middle / total[:, None]
+    normal = np.stack([np.bincount(number, weights=vectors[:, axis]) for axis in range(3)], axis=1)
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    points = np.einsum("sc,tck->tsk", _SAMPLES, triangles).reshape(-1, 3)
+    of = np.repeat(number, len(_SAMPLES))
     size = float(np.linalg.norm(np.ptp(base.reshape(-1, 3), axis=0)))
-    nearest, _, _ = TriangleTree(base).nearest(middle, normal, TURNED * size)
-    found: Array = nearest[number]
+    nearest, _, distance = TriangleTree(base).nearest(points, normal[of], TURNED * size)
+    # Within a head are surfaces that nobody sees, and that may be nearer: the outermost one counts.
+    reach = max(TURNED * size, 1e-30)
+    hits = EmbreeCaster(base, threads=1).intersect(points + reach * normal[of], -normal[of])
+    seen = (hits.triangle >= 0) & hits.front & (hits.distance < 2.0 * reach)
+    nearest = np.where(seen, hits.triangle, nearest)
+    distance = np.where(seen, np.abs(hits.distance - reach), distance)
+    area = np.repeat(np.maximum(np.linalg.norm(vectors, axis=1), 1e-30), len(_SAMPLES))
+    pair, row = np.unique(np.stack([of, chart[nearest]], axis=1), axis=0, return_inverse=True)
+    votes = np.bincount(row.reshape(-1), weights=area)
+    away = np.bincount(row.reshape(-1), weights=area * distance) / votes
+    order = np.lexsort((away, -votes, pair[:, 0]))
+    first = order[np.flatnonzero(np.diff(pair[order, 0], prepend=-1))]
+    found: Array = pair[first, 1][number]
     return found
