@@ -156,7 +156,8 @@ def test_levels_follow_names_roles_and_selection(room: Path) -> None:
     add_plane("Shelf_LOD0", 4)
     coarse = add_plane("Shelf_LOD1", 1)
     plain, of_plain = add_plane("Box", 2, (-0.8, 0, 1)), add_plane("Box_LOD1", 1, (-0.8, 0, 1))
-    own = add_plane("Roof_LOD1", 1, (0, 0, 1.5))  # there is no finer one
+    own, far = (add_plane(f"Roof_LOD{number}", 1, (0, 0, 1.5)) for number in (1, 2))
+    add_plane("Roof_LOD0", 3, (0, 0, 1.5)).hide_render = True
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in (coarse, own))
     bpy.context.scene.radiosity.scope = "selected"
@@ -164,7 +165,8 @@ def test_levels_follow_names_roles_and_selection(room: Path) -> None:
     shown = {
         obj.name for obj in bpy.data.objects if obj.type == "MESH" and obj.data.uv_layers.get("Lightmap")
     }
-    assert shown == {"Shelf_LOD0", "Shelf_LOD1", "Roof_LOD1"}
+    assert shown == {"Shelf_LOD0", "Shelf_LOD1", "Roof_LOD1", "Roof_LOD2"}
+    np.testing.assert_allclose(uvs(far), uvs(own), atol=1e-6)
     bpy.context.scene.radiosity.scope = "all"
     assert bake() == {"FINISHED"}
     np.testing.assert_allclose(

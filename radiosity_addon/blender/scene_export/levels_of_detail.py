@@ -41,10 +41,9 @@ def share_levels(contents: SceneContents) -> None:
         levels.sort()
         if levels[0][0] > 0 and name in plain:  # Rock, Rock_LOD1 …
             levels.insert(0, (0, plain[name]))
-        if levels[0][0] > 0:
-            continue
-        base = contents.pieces[levels[0][1]]
-        coarser = [row for number, row in levels[1:] if number > 0]
+        finest, row = levels[0]
+        base = contents.pieces[row]
+        coarser = [row for number, row in levels[1:] if number > finest]
         for row in coarser:
             contents.pieces[row] = _coarser(contents.pieces[row], base, contents)
         if coarser:
