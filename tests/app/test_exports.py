@@ -127,14 +127,16 @@ def test_what_another_form_leaves_of_earlier_lightmaps_is_named(run: Run, room: 
     out = tmp_path / "out"
     assert run("bake", room, "--output", out, *QUICK, "--export", "web").code == 0
     assert "earlier" not in run("export", out, "--forms", "godot").out
-    assert run("bake", room, "--output", out, *QUICK, "--seed", "1", "--export", "web", "--quiet").code == 0
+    assert (
+        run("bake", room, "--output", out, *QUICK, "--seed", "1", "--export", "web,rgbm", "--quiet").code == 0
+    )
     done = run("bake", room, "--output", out, *QUICK, "--padding", "4", "--export", "godot")
-    for name in ("scene_baked.glb", "viewer.html"):
+    for name in ("scene_baked.glb", "viewer.html", "lightmap_rgbm.png"):
         assert f"note: {name} is of earlier lightmaps" in done.out
     done = run("export", out, "--forms", "godot")
     assert "note: viewer.html is of earlier lightmaps" in done.out
     assert is_outdated_export(out)
-    done = run("export", out, "--forms", "web")
+    done = run("export", out, "--forms", "web,rgbm")
     assert "earlier" not in done.out
     assert not is_outdated_export(out)
 
