@@ -103,6 +103,14 @@ def linked_output(socket: bpy.types.NodeSocket) -> str:
     return f"{link.from_node.name}\n{link.from_socket.identifier}"
 
 
+def followed_socket(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    """Return the input of a tree, our copy or the original, whose constant a node of ours repeats."""
+    name, identifier = node[FOLLOWS]
+    reader = tree.nodes.get(name)
+    inputs = () if reader is None else reader.inputs
+    return next((socket for socket in inputs if socket.identifier == identifier), None)
+
+
 def behind_ours(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Return the input that takes what an input would take without the nodes that we put in between."""
     while socket.is_linked and socket.links[0].from_node.get(THROUGH):

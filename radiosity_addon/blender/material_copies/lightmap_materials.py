@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 
+from ...base import BakeWarning
 from ...numerics import brdf_of_reflectance, radiance_of_radiosity
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import ORIGINAL, is_made, mark_made
@@ -50,6 +51,7 @@ from .copy_marks import (
 )
 from .copy_record import record
 from .false_colors import false_colors
+from .followed_values import follow_keys, is_animated
 from .light_shares import LightShares
 from .parted_surfaces import PartedSurfaces
 from .surface_nodes import SurfaceSockets, feed_color, feed_float
@@ -66,6 +68,10 @@ RADIANCE_PER_TEXEL = {
 residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
 
 
+HOLDS_REFLECTED = ("radiosity", "residual")
+"""Quantities that hold what the surface reflects and emits already, and so does its error."""
+
+
 class LightmapMaterials:
     """Makes the lightmap copies of materials for one bake, each once; `shares` where it has light groups."""
 
@@ -74,6 +80,12 @@ class LightmapMaterials:
         self._shares = shares
         self._made: dict[tuple[Any, ...], bpy.types.Material] = {}
         self._glows: dict[bpy.types.Material | None, bool] = {}
+        self._still: dict[str, BakeWarning] = {}
+
+    @property
+    def warnings(self) -> tuple[BakeWarning, ...]:
+        """Those of materials whose keyframes and drivers do not show."""
+        return tuple(self._still.values())
 
     def copy_of(
         self,
@@ -137,12 +149,27 @@ class LightmapMaterials:
                 self._glows[material], copy[GROUP] = True, group
             if index == 0:
                 _skip_light_sampling(copy, surface)
+        if material is not None and is_animated(tree):
+            self._warn_of_still(material.name, reader.is_parted)
         mark_added(tree, before)
         tree.nodes.active = active
         for inner in dict.fromkeys(copied_groups(tree)):
             mark_added(inner, {node.name for node in inner[ORIGINAL].nodes})
+        follow_keys(copy)
         record_content()
         return copy
+
+    def _warn_of_still(self, name: str, is_parted: bool) -> None:
+        """Warn of an animated material if its lightmap stays as it was baked."""
+        if self._quantity in HOLDS_REFLECTED:
+            reason = f"the quantity '{self._quantity}' holds reflected light; bake 'irradiance_over_pi'"
+        elif not is_parted:
+            reason = "its shader is of a kind that cannot be read; use a Principled BSDF"
+        else:
+            return
+        frame = bpy.context.scene.frame_current
+        message = f"material '{name}' is animated, but its lightmap shows it as at frame {frame}: {reason}"
+        self._still[name] = BakeWarning(name, message)
 
     def _wire(
         self,
@@ -164,8 +191,7 @@ class LightmapMaterials:
         texture.interpolation = "Linear"
         texture.location = (x, y + 450)
         group = tree.nodes.new("ShaderNodeGroup")
-        # Radiosity already holds what the surface reflects and emits, and so does its error.
-        holds_all = self._quantity in ("radiosity", "residual")
+        holds_all = self._quantity in HOLDS_REFLECTED
         see_through = surface.alpha != 1.0
         group.node_tree = lightmap_group(is_parted and not holds_all, see_through)
         group.name = group.label = group.node_tree.name

@@ -75,8 +75,7 @@ class PartedSurfaces(SurfaceReader):
 def _part(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.Node:
     """Put our node between a color and the input that takes it; returns the node."""
     is_color = socket.type == "RGBA"  # else it is of a shader, and glows
-    if is_color and not socket.is_linked and not is_keyed(socket):
-        source_of(tree, socket)
+    source = source_of(tree, socket) if is_color and not socket.is_linked else None
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = shine_group()
     node.name, node.label = node.node_tree.name, f"{node.node_tree.name}: {socket.name}"
@@ -84,6 +83,8 @@ def _part(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.N
     node[THROUGH] = True
     if is_color:
         node.inputs[COLOR].default_value = socket.default_value
+    if source is not None:
+        tree.links.new(source, node.inputs[COLOR])
     for link in list(socket.links):
         tree.links.new(link.from_socket, node.inputs[COLOR]).is_muted = link.is_muted
     tree.links.new(node.outputs[GLOSSY_COLOR], socket)
@@ -93,7 +94,7 @@ def _part(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.N
 def _repeat(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
     """Have our node take what the shader takes: a constant as it is now, but for those that matter much."""
     feed = feed_of(socket, enter_groups=False)
-    if feed.node is not None or target.name in (METALLIC, TRANSMISSION):
+    if feed.node is not None or is_keyed(socket) or target.name in (METALLIC, TRANSMISSION):
         tree.links.new(source_of(tree, socket), target)
     else:
         target.default_value = socket.default_value

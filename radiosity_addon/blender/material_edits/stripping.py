@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..datablocks.bake_record import ORIGINAL, is_made
-from ..datablocks.keyed_paths import move_keys, path_of
+from ..datablocks.keyed_paths import is_keyed, move_keys, path_of
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR, EMISSION, SHADER, SURFACE
 from ..material_copies.copy_marks import (
     COPY_MARKS,
@@ -75,6 +75,9 @@ def strip_tree(tree: bpy.types.NodeTree) -> bool:
     for source, target in outward:
         _reconnect(tree, source, target)
     for name in added:
+        for output in tree.nodes[name].outputs:
+            if is_keyed(output):
+                output.driver_remove("default_value")
         tree.nodes.remove(tree.nodes[name])
     for node in tree.nodes:
         if node.type == "GROUP" and is_copied_group(node.node_tree):
