@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.files.files import empty_scene
 from radiosity_addon.blender.material_copies.copy_marks import behind_ours
 from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
@@ -154,6 +155,75 @@ def test_a_normal_map_turns_the_highlight(tmp_path: Path) -> None:
     bake_by_hand(show="shine")
     mirrored = np.add(BASE, np.subtract(1.0, BASE) * (1.0 - 0.5**0.5) ** 5)
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(mirrored, TEXEL), rtol=1e-3)
+
+
+def added(kind: str, place: str, mix: str = "Add") -> Material:
+    """A Diffuse BSDF and one that shines, through a shader that joins them.
+
+    place: "flat"; "shared", of one color node; "group", in a node group; "below", with a second Add Shader.
+    """
+    material = principled_material()
+    tree = material.node_tree
+    output = shader(material, "OUTPUT_MATERIAL").inputs["Surface"]
+    tree.nodes.remove(shader(material))
+    if place == "group":
+        tree = bpy.data.node_groups.new("Inside", "ShaderNodeTree")
+        tree.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+        node = material.node_tree.nodes.new("ShaderNodeGroup")
+        node.node_tree = tree
+        material.node_tree.links.new(node.outputs[0], output)
+        output = tree.nodes.new("NodeGroupOutput").inputs[0]
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", Color=(*BASE, 1.0))
+    gloss = add_node(tree, f"ShaderNodeBsdf{kind}", Color=(0.3, 0.6, 0.2, 1.0), Roughness=0.3)
+    if place == "shared":
+        color = tree.nodes.new("ShaderNodeRGB")
+        color.outputs[0].default_value = GREEN
+        for reader in (diffuse, gloss):
+            tree.links.new(color.outputs[0], reader.inputs["Color"])
+    join = tree.nodes.new(f"ShaderNode{mix}Shader")
+    first = 1 if mix == "Mix" else 0
+    tree.links.new(diffuse.outputs[0], join.inputs[first])
+    tree.links.new(gloss.outputs[0], join.inputs[first + 1])
+    if place == "below":
+        outer = tree.nodes.new("ShaderNodeAddShader")
+        tree.links.new(join.outputs[0], outer.inputs[0])
+        tree.links.new(
+            add_node(tree, "ShaderNodeBsdfTransparent", Color=(0.0,) * 4).outputs[0], outer.inputs[1]
+        )
+        join = outer
+    tree.links.new(join.outputs[0], output)
+    return material
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize(
+    ("kind", "place", "mix"),
+    [
+        ("Sheen", "flat", "Add"),
+        ("Sheen", "group", "Add"),
+        ("Sheen", "flat", "Mix"),
+        ("Glossy", "flat", "Add"),
+        ("Glossy", "shared", "Add"),
+        ("Glossy", "below", "Add"),
+        ("Glossy", "group", "Mix"),
+    ],
+)
+def test_what_shines_next_to_a_diffuse_shader_stays(kind: str, place: str, mix: str, tmp_path: Path) -> None:
+    """In a light that comes from all sides, and in that of a lamp, seen from the side."""
+    plane = add_plane(material=added(kind, place, mix))
+    plane.rotation_euler.x, plane.scale = np.radians(50), (9.0, 9.0, 9.0)
+    received = 3.0 * np.cos(np.radians(50.0)) / np.pi
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    shown = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=0.01)
+    restore(bpy.context)
+    bpy.context.scene.world = None
+    add_lamp("SUN", energy=3.0, transform={"rotation_euler": (np.radians(100.0), 0.0, 0.0)})
+    expected = seen_from_above(tmp_path, 2, samples=256)
+    bake_by_hand(((received,) * 3,), show="shine")
+    np.testing.assert_allclose(seen_from_above(tmp_path, 2, samples=256), expected, rtol=0.01)
 
 
 def other_color(copy: Material) -> None:
