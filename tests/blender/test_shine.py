@@ -54,8 +54,8 @@ LAYERED = {
     "metal": painted(Metallic=1.0, Roughness=0.3),
     "subsurface metal": painted(Subsurface_Weight=1.0, Metallic=1.0),
 }
-NOT_PARTED = {"grouped", "muted link", "no output", "glass", "half a metal"}
-"""Those that stay matte, that are black, and that are part of both."""
+NOT_PARTED = {"grouped", "muted link", "no output", "glass"}
+"""Those that stay matte, and that are black."""
 
 DIFFUSE = {
     "no specular": painted(Specular_IOR_Level=0.0),
@@ -103,6 +103,32 @@ def test_in_even_light_it_looks_so_from_the_side(kind: str, degrees: int, tmp_pa
     np.testing.assert_allclose(
         seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1)), expected, rtol=0.02
     )
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize("degrees", [0, 60])
+@pytest.mark.parametrize("level", [0.0, 0.5])
+@pytest.mark.parametrize("metallic", [0.0, 0.25, 0.5, 0.75, 1.0])
+def test_what_is_a_metal_in_part_looks_as_unbaked(
+    metallic: float, level: float, degrees: int, tmp_path: Path
+) -> None:
+    """In the light of the sky, and in that of a lamp with little of it; lamps add nothing that is diffuse."""
+    paint = principled_material(Metallic=metallic, Specular_IOR_Level=level, Roughness=0.4)
+    plane = add_plane(material=paint)
+    plane.rotation_euler.x, plane.scale = np.radians(degrees), (9.0, 9.0, 9.0)
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    shown = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=0.04)
+    restore(bpy.context)
+    set_world(0.25, 0.25, 0.25)
+    add_lamp("SUN", energy=3.0, transform={"rotation_euler": (np.radians(degrees - 40.0), 0.0, 0.0)})
+    received = 0.25 + 3.0 * np.cos(np.radians(40.0)) / np.pi
+    expected = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    bake_by_hand(((received,) * 3,), show="shine")
+    shown = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=0.015)
 
 
 @pytest.mark.parametrize("kind", DIFFUSE)

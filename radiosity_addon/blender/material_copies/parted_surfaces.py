@@ -13,7 +13,7 @@ import bpy
 
 from ..datablocks.keyed_paths import is_keyed
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR
-from ..images.shine_group import COLOR, GLOSSY_COLOR, LAYERS, METALLIC, TRANSMISSION, shine_group
+from ..images.shine_group import COLOR, GLOSSY_COLOR, LAYERS, REPLACED, TRANSMISSION, shine_group
 from ..materials.shader_nodes import feed_of
 from ..materials.shader_terms import GLASS
 from .copy_marks import THROUGH
@@ -58,7 +58,10 @@ class PartedSurfaces(SurfaceReader):
             return source_of(place, color), BLACK
         parted = _part(place, color)
         for name in LAYERS if is_layered else ():
-            _repeat(place, node.inputs[name], parted.inputs[name])
+            if name in REPLACED:
+                _put_between(place, parted.inputs[name], parted.outputs[name], node.inputs[name])
+            else:
+                _repeat(place, node.inputs[name], parted.inputs[name])
         return parted.outputs[BASE_COLOR], parted.outputs[DIFFUSE_COLOR]
 
     def emitted(self, color: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> bpy.types.NodeSocket:
@@ -74,27 +77,35 @@ class PartedSurfaces(SurfaceReader):
 
 def _part(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.Node:
     """Put our node between a color and the input that takes it; returns the node."""
-    is_color = socket.type == "RGBA"  # else it is of a shader, and glows
-    source = source_of(tree, socket) if is_color and not socket.is_linked else None
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = shine_group()
     node.name, node.label = node.node_tree.name, f"{node.node_tree.name}: {socket.name}"
     node.location = (socket.node.location.x - 200, socket.node.location.y)
     node[THROUGH] = True
-    if is_color:
-        node.inputs[COLOR].default_value = socket.default_value
-    if source is not None:
-        tree.links.new(source, node.inputs[COLOR])
-    for link in list(socket.links):
-        tree.links.new(link.from_socket, node.inputs[COLOR]).is_muted = link.is_muted
-    tree.links.new(node.outputs[GLOSSY_COLOR], socket)
+    _put_between(tree, node.inputs[COLOR], node.outputs[GLOSSY_COLOR], socket)
     return node
+
+
+def _put_between(
+    tree: bpy.types.NodeTree,
+    taken: bpy.types.NodeSocket,
+    given: bpy.types.NodeSocket,
+    socket: bpy.types.NodeSocket,
+) -> None:
+    """Have an input of our node take what feeds a socket, or its constant, and an output feed the socket."""
+    if socket.type != "SHADER":  # else a color makes it glow
+        taken.default_value = socket.default_value
+        if not socket.is_linked:
+            tree.links.new(source_of(tree, socket), taken)
+    for link in list(socket.links):
+        tree.links.new(link.from_socket, taken).is_muted = link.is_muted
+    tree.links.new(given, socket)
 
 
 def _repeat(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
     """Have our node take what the shader takes: a constant as it is now, but for those that matter much."""
     feed = feed_of(socket, enter_groups=False)
-    if feed.node is not None or is_keyed(socket) or target.name in (METALLIC, TRANSMISSION):
+    if feed.node is not None or is_keyed(socket) or target.name == TRANSMISSION:
         tree.links.new(source_of(tree, socket), target)
     else:
         target.default_value = socket.default_value

@@ -19,6 +19,7 @@ from ..material_copies.copy_marks import (
     is_added,
     is_copied_group,
     linked_output,
+    passed_input,
     users_inputs,
 )
 from ..materials.shader_nodes import feed_of
@@ -100,7 +101,9 @@ def _reconnect(tree: bpy.types.NodeTree, source: bpy.types.NodeSocket, target: b
     link = target.links[0]
     is_muted = link.is_muted and not is_lightmap_node(node)
     while is_added(node):
-        before = node.inputs[0] if node.get(THROUGH) or is_lightmap_node(node) else None
+        before = passed_input(source) if node.get(THROUGH) else None
+        if is_lightmap_node(node):
+            before = node.inputs[SURFACE]
         if before is None or not before.is_linked:
             tree.links.remove(link)
             return
