@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -65,6 +65,18 @@ def show_in_groups(look: str) -> None:
     for tree in _groups():
         if tree.get(_KIND) is not None:
             _show(tree, look)
+
+
+def looks_of_groups() -> dict[int, str]:
+    """Return the look that each group shows, by its `session_uid`."""
+    return {tree.session_uid: _shown(tree) for tree in _groups() if tree.get(_KIND) is not None}
+
+
+def put_looks_back(looks: Mapping[int, str]) -> None:
+    """Have the groups that are still there show what they showed; see `looks_of_groups`."""
+    for tree in _groups():
+        if tree.session_uid in looks:
+            _show(tree, looks[tree.session_uid])
 
 
 @contextmanager

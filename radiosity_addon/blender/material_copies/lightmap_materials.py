@@ -8,6 +8,7 @@ so that it can be edited as the original can; `material_edits.py` carries such e
 from __future__ import annotations
 
 import uuid
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -32,6 +33,8 @@ from ..images.node_group import (
     SHADER,
     SURFACE,
     lightmap_group,
+    looks_of_groups,
+    put_looks_back,
     show_in_groups,
 )
 from ..materials.materials import is_volume, read_material, uses_nodes
@@ -232,11 +235,38 @@ def show_lightmaps(look: str) -> int:
     count = 0
     for material in bpy.data.materials:
         if is_made(material) and material.node_tree is not None:
-            for node in material.node_tree.nodes:
-                if node.type == "GROUP" and node.node_tree is not None and LIGHTMAP_ONLY in node.inputs:
-                    node.inputs[LIGHTMAP_ONLY].default_value = float(look == LOOK_LIGHTMAP)
+            for socket in _earlier_switches(material):
+                socket.default_value = float(look == LOOK_LIGHTMAP)
             count += 1
     return count
+
+
+def looks_kept() -> Callable[[], None]:
+    """Return what makes all lightmap materials of now, as far as they still exist, look as they do now."""
+    groups = looks_of_groups()
+    materials = {
+        material.session_uid: [socket.default_value for socket in _earlier_switches(material)]
+        for material in bpy.data.materials
+        if is_made(material) and material.node_tree is not None
+    }
+
+    def put_back() -> None:
+        put_looks_back(groups)
+        for material in bpy.data.materials:
+            if materials.get(material.session_uid):
+                values = materials[material.session_uid]
+                for socket, value in zip(_earlier_switches(material), values, strict=True):
+                    socket.default_value = value
+
+    return put_back
+
+
+def _earlier_switches(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
+    """Return the inputs by which a material of an earlier version shows the lightmap alone."""
+    groups = [
+        node for node in material.node_tree.nodes if node.type == "GROUP" and node.node_tree is not None
+    ]
+    return [node.inputs[LIGHTMAP_ONLY] for node in groups if LIGHTMAP_ONLY in node.inputs]
 
 
 def _make_plain_nodes(material: bpy.types.Material, color: Any) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 
 from ...base import UsageError
@@ -10,9 +13,13 @@ from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES
 from .option_properties import OptionProperties, chosen_options, option_property
 from .preferences import memory_limit_of, threads_of
 
+_putting_back: list[bool] = []
+"""Not empty while scenes get back what they said of the look, each its own."""
+
 
 def _show(settings: RadiositySettings, _context: bpy.types.Context) -> None:
-    show_look_of(settings.id_data)
+    if not _putting_back:
+        show_look_of(settings.id_data)
 
 
 class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
@@ -56,6 +63,31 @@ def show_look_of(scene: bpy.types.Scene) -> None:
     for other in bpy.data.scenes:
         if other.library is None and look_of(other) != look:
             other.radiosity.show = look
+
+
+@contextmanager
+def looks_put_back() -> Iterator[None]:
+    """Put back what is shown, and what each scene says of it, if this fails."""
+    from ..material_copies.lightmap_materials import looks_kept
+
+    put_back = looks_kept()
+    scenes = [scene for scene in bpy.data.scenes if scene.library is None]
+    settings = {scene: scene.radiosity for scene in scenes if scene.is_property_set("radiosity")}
+    said = {scene: group.show for scene, group in settings.items() if group.is_property_set("show")}
+    try:
+        yield
+    except BaseException:
+        put_back()
+        _putting_back.append(True)
+        for scene in scenes:
+            if scene in said:
+                scene.radiosity.show = said[scene]
+            elif scene in settings:
+                scene.radiosity.property_unset("show")
+            else:
+                scene.property_unset("radiosity")
+        _putting_back.pop()
+        raise
 
 
 def read_earlier(_: object = None) -> None:
