@@ -11,10 +11,8 @@ from typing import Any
 
 import bpy
 
-from ..datablocks.keyed_paths import is_keyed
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR
-from ..images.shine_group import COLOR, GLOSSY_COLOR, LAYERS, REPLACED, TRANSMISSION, shine_group
-from ..materials.shader_nodes import feed_of
+from ..images.shine_group import COLOR, GLOSSY_COLOR, LAYERS, REPLACED, shine_group
 from ..materials.shader_terms import GLASS
 from .copy_marks import THROUGH
 from .surface_nodes import BLACK, ColorSource, SurfaceReader, SurfaceSockets, source_of
@@ -61,7 +59,7 @@ class PartedSurfaces(SurfaceReader):
             if name in REPLACED:
                 _put_between(place, parted.inputs[name], parted.outputs[name], node.inputs[name])
             else:
-                _repeat(place, node.inputs[name], parted.inputs[name])
+                place.links.new(source_of(place, node.inputs[name]), parted.inputs[name])
         return parted.outputs[BASE_COLOR], parted.outputs[DIFFUSE_COLOR]
 
     def emitted(self, color: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> bpy.types.NodeSocket:
@@ -100,12 +98,3 @@ def _put_between(
     for link in list(socket.links):
         tree.links.new(link.from_socket, taken).is_muted = link.is_muted
     tree.links.new(given, socket)
-
-
-def _repeat(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
-    """Have our node take what the shader takes: a constant as it is now, but for those that matter much."""
-    feed = feed_of(socket, enter_groups=False)
-    if feed.node is not None or is_keyed(socket) or target.name == TRANSMISSION:
-        tree.links.new(source_of(tree, socket), target)
-    else:
-        target.default_value = socket.default_value
