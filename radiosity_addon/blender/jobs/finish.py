@@ -218,7 +218,7 @@ def _show(
         if keeping is not None:
             kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
         behind = yield from apply_steps(context, export, result, images, settings, groups, earlier)
-        show_look_of(context.scene)
+        behind = (*behind, *show_look_of(context.scene))
     except BaseException:
         remove_datablocks([*images, *each_image(groups)])
         raise
