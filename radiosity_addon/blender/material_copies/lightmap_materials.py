@@ -32,6 +32,7 @@ from ..images.node_group import (
     SCALE,
     SHADER,
     SURFACE,
+    libraries_showing_others,
     lightmap_group,
     looks_of_groups,
     put_looks_back,
@@ -239,6 +240,18 @@ def show_lightmaps(look: str) -> int:
                 socket.default_value = float(look == LOOK_LIGHTMAP)
             count += 1
     return count
+
+
+def linked_looks(look: str) -> tuple[BakeWarning, ...]:
+    """Warn of files whose linked materials show another look than this one's."""
+    return tuple(
+        BakeWarning(
+            library.name,
+            f"lightmaps linked from '{library.filepath}' are shown differently from this file's, which show "
+            f"'{look}': open that file, choose Show there, and reload",
+        )
+        for library in libraries_showing_others(look)
+    )
 
 
 def looks_kept() -> Callable[[], None]:

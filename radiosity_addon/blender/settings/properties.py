@@ -17,6 +17,9 @@ from .preferences import memory_limit_of, threads_of
 _LOOK = ("show", "highlights")
 """What scenes say of the look."""
 
+_counts: list[int] = []
+"""Scenes, objects and node groups when their looks were united last."""
+
 _quiet: list[bool] = []
 """Not empty while that changes without the look itself."""
 
@@ -61,18 +64,39 @@ def look_of(scene: bpy.types.Scene) -> str:
 def show_look_of(scene: bpy.types.Scene) -> tuple[BakeWarning, ...]:
     """Show all lightmaps of the file as a scene asks; its other scenes say the same from then on.
 
-    Returns warnings: Of lamps whose highlights stay.
+    Returns warnings: Of what is linked and keeps another look, and of lamps whose highlights stay.
     """
-    from ..material_copies.lightmap_materials import show_lightmaps
+    from ..material_copies.lightmap_materials import linked_looks, show_lightmaps
 
     show_lightmaps(look_of(scene))
-    warnings = show_highlights(bool(_said_by(scene, "highlights")))
+    highlights = show_highlights(bool(_said_by(scene, "highlights")))
     with _quietly():
         for other in bpy.data.scenes:
             for name in _LOOK if other.library is None else ():
                 if _said_by(other, name) != _said_by(scene, name):
                     setattr(other.radiosity, name, _said_by(scene, name))
-    return warnings
+    return (*linked_looks(look_of(scene)), *highlights)
+
+
+def unite_looks(_: object = None) -> None:
+    """Have what was appended be shown as the open scene shows its own."""
+    from ..images.node_group import is_shown_by_all
+
+    scene = bpy.context.scene
+    scenes = [other for other in bpy.data.scenes if other.library is None]
+    said_alike = all(_said_by(other, name) == _said_by(scene, name) for other in scenes for name in _LOOK)
+    if not said_alike or not is_shown_by_all(look_of(scene)):
+        show_look_of(scene)
+    elif _said_by(scene, "highlights"):
+        show_highlights(True)
+
+
+def unite_looks_of_more(_: object = None) -> None:
+    """Do so if there is more or less in the file than at the last call."""
+    counts = [len(blocks) for blocks in (bpy.data.scenes, bpy.data.objects, bpy.data.node_groups)]
+    if counts != _counts:
+        _counts[:] = counts
+        unite_looks()
 
 
 def _said_by(scene: bpy.types.Scene, name: str) -> object:
