@@ -160,6 +160,22 @@ def test_other_frames_are_no_edits_and_no_trace_is_left(kind: str) -> None:
     assert animated_paths() == before
 
 
+def test_it_still_follows_after_saving_and_loading(tmp_path: Path) -> None:
+    for kind in ("base color", "group", "driven by a property"):
+        add_plane(kind, ANIMATED[kind]())
+    bpy.context.scene.frame_set(1)
+    bake_by_hand()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "animated.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "animated.blend"))
+    for name in ("group", "driven by a property"):
+        bpy.data.objects[name].hide_render = True
+    bpy.context.scene.frame_set(11)
+    np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], TEXEL, rtol=1e-4)
+    assert carry_material_edits() == ()
+    restore(bpy.context)
+    assert len(bpy.data.materials) == 3
+
+
 def animated_paths() -> list[str]:
     trees = [material.node_tree for material in bpy.data.materials] + list(bpy.data.node_groups)
     return sorted(curve.data_path for tree in trees if tree is not None for curve in curves(tree))

@@ -9,7 +9,6 @@ import bpy
 
 from ...base import BakeWarning, UsageError
 from ...options import PANEL_OPTIONS, BakeSettings
-from ..apply.lamp_highlights import highlights_kept, show_highlights
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES
 from .option_properties import OptionProperties, chosen_options, option_property
 from .preferences import memory_limit_of, threads_of
@@ -66,6 +65,7 @@ def show_look_of(scene: bpy.types.Scene) -> tuple[BakeWarning, ...]:
 
     Returns warnings: Of what is linked and keeps another look, and of lamps whose highlights stay.
     """
+    from ..apply.lamp_highlights import show_highlights
     from ..material_copies.lightmap_materials import linked_looks, show_lightmaps
 
     show_lightmaps(look_of(scene))
@@ -80,9 +80,12 @@ def show_look_of(scene: bpy.types.Scene) -> tuple[BakeWarning, ...]:
 
 def unite_looks(_: object = None) -> None:
     """Have what was appended be shown as the open scene shows its own."""
+    from ..apply.lamp_highlights import show_highlights
     from ..images.node_group import is_shown_by_all
 
     scene = bpy.context.scene
+    if scene is None:
+        return
     scenes = [other for other in bpy.data.scenes if other.library is None]
     said_alike = all(_said_by(other, name) == _said_by(scene, name) for other in scenes for name in _LOOK)
     if not said_alike or not is_shown_by_all(look_of(scene)):
@@ -108,6 +111,7 @@ def _said_by(scene: bpy.types.Scene, name: str) -> object:
 @contextmanager
 def looks_put_back() -> Iterator[None]:
     """Put back what is shown, and what each scene says of it, if this fails."""
+    from ..apply.lamp_highlights import highlights_kept
     from ..material_copies.lightmap_materials import looks_kept
 
     shown, highlights = looks_kept(), highlights_kept()
