@@ -11,6 +11,7 @@ import pytest
 
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.keyed_paths import curves
+from radiosity_addon.blender.files.files import empty_scene
 from radiosity_addon.blender.material_copies.copy_marks import COPY_MARKS
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from tests.blender.edited_copies import GREEN, Material, copy_of, grouped_material, shader
@@ -250,3 +251,18 @@ def test_eevee_follows_keyframes(tmp_path: Path) -> None:
     seen = seen_in_eevee(EEVEE, tmp_path)
     expected = np.multiply.outer([0.0, 0.5, 1.0], np.multiply([1.0, 0.5, 0.25], TEXEL))
     np.testing.assert_allclose(seen, expected, rtol=2e-3, atol=1e-4)
+
+
+def test_a_linked_material_is_followed(tmp_path: Path) -> None:
+    """Its copy is this file's, and the animation the other file's."""
+    ANIMATED["base color"]().use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "paints.blend"))
+    empty_scene()
+    with bpy.data.libraries.load(str(tmp_path / "paints.blend"), link=True) as (_, wanted):
+        wanted.materials = ["Paint"]
+    add_plane(material=wanted.materials[0])
+    bpy.context.scene.frame_set(1)
+    bake_by_hand()
+    bpy.context.scene.frame_set(11)
+    np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], TEXEL, rtol=1e-4)
+    assert carry_material_edits() == ()
