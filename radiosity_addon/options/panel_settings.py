@@ -88,6 +88,13 @@ class _PanelSettings:
         choices=LOOKS,
         panel=PanelRow("Show", expand=True),
     )
+    highlights: bool = option(
+        True,
+        "Lamps of baked scenes make highlights on what shines. Off switches off Ray Visibility, Glossy, of "
+        "these lamps, so that no surface mirrors them; Restore switches it on again",
+        LAST_BAKE,
+        panel=PanelRow("Highlights of Lamps"),
+    )
     export_web: bool = _form("web", True)
     export_glb: bool = _form("glb")
     export_godot: bool = _form("godot")

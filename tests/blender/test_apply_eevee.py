@@ -51,3 +51,25 @@ def test_in_eevee_lamps_light_what_shines_and_nothing_else(tmp_path: Path) -> No
     assert not metal.any()
     assert (lit_metal > 0.1).all()
     np.testing.assert_allclose(matte_metal, [0.125, 0.125, 2.25], rtol=2e-3)
+
+
+HALF_METAL = """
+from radiosity_addon.blender.datablocks import bake_record
+from tests.blender.scenes import add_lamp
+bake_record.register()
+for metallic in 0.25, 0.75:
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    hand_bake.add_plane(material=hand_bake.principled_material(Metallic=metallic, Roughness=0.4))
+    bpy.context.scene.world = None
+    turned = np.radians(50.0)
+    add_lamp("SUN", energy=3.0, use_shadow=False, transform={"rotation_euler": (turned, 0.0, 0.0)})
+    look()
+    received = 3.0 * np.cos(turned) / np.pi
+    hand_bake.bake_by_hand(((received,) * 3,), folder=Path(sys.argv[1]), show="shine")
+    look()
+"""
+
+
+def test_in_eevee_half_a_metal_looks_as_unbaked(tmp_path: Path) -> None:
+    seen = seen_in_eevee("import numpy as np\n" + HALF_METAL, tmp_path)
+    np.testing.assert_allclose(seen[1::2], seen[::2], rtol=0.01)

@@ -19,8 +19,10 @@ from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.operators.bake_operators import show_result
 from radiosity_addon.blender.operators.checks import look
 from radiosity_addon.blender.operators.cleaning import interrupted_folders
+from radiosity_addon.blender.relight import lightmap_versions
 from radiosity_addon.blender.session import last_bake
 from radiosity_addon.blender.session.state import session
+from radiosity_addon.blender.settings.properties import look_of
 from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=32, quality="draft")
@@ -209,6 +211,50 @@ def test_all_scenes_of_a_file_say_what_is_shown(box: bpy.types.Scene) -> None:
     third = bpy.data.scenes.new("Third")
     bake()
     assert third.radiosity.show == "lightmap"
+
+
+@pytest.mark.parametrize("baked_in", ["Box", "Third"])
+def test_a_bake_that_cannot_be_published_leaves_what_is_shown(
+    baked_in: str, box: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Of scenes with looks of their own, as new ones have."""
+    box.name = "Box"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    bake()
+    box.radiosity.show = "matte"
+    third = bpy.data.scenes.new("Third")
+    for obj in box.objects:
+        third.collection.objects.link(obj)
+    third.radiosity.resolution = box.radiosity.resolution
+    third.radiosity.quality = box.radiosity.quality
+    fourth = bpy.data.scenes.new("Fourth")
+
+    def state() -> list[object]:
+        scenes = (box, third, fourth)
+        trees = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]
+        results = [(tree.name, node) for tree in trees for node in tree.nodes if node.type == "GROUP_OUTPUT"]
+        return [
+            [
+                scene.is_property_set("radiosity") and scene.radiosity.is_property_set("show")
+                for scene in scenes
+            ],
+            [look_of(scene) for scene in scenes],
+            [(name, node.inputs[0].links[0].from_node.name) for name, node in results],
+        ]
+
+    def full(*_: object) -> None:
+        raise BakeError("no space left on device")
+
+    before = state()
+    assert before[:2] == [[True, False, False], ["matte", "shine", "shine"]]
+    bpy.context.window.scene = bpy.data.scenes[baked_in]
+    monkeypatch.setattr(lightmap_versions, "publish", full)
+    with pytest.raises(RuntimeError, match="no space left"):
+        bake()
+    assert state() == before
+    monkeypatch.undo()
+    bake()
+    assert len(set(state()[1])) == 1
 
 
 def test_undo_of_another_look_brings_the_earlier_one_back(box: bpy.types.Scene) -> None:

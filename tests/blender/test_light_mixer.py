@@ -158,6 +158,7 @@ def test_an_appended_object_brings_its_sliders(tmp_path: Path) -> None:
         wanted.objects = ["Plane"]
     bpy.context.scene.collection.objects.link(bpy.data.objects["Plane"])
     assert len(bpy.data.scenes) == 1
+    bpy.context.scene.radiosity.show = "matte"  # as the bake was; else it is shown as new files show theirs
     slide("Lamps", 2.0)
     np.testing.assert_allclose(seen(tmp_path), expected(2, 1), rtol=1e-4)
 

@@ -278,6 +278,40 @@ def test_a_sidecar_of_an_earlier_bake_is_refused(room: Path, run: Run) -> None:
     assert changes(before, tree(room / "out")) == []
 
 
+@pytest.mark.parametrize("copied", ["the scene", "baked.blend", "baked.blend, next to it"])
+def test_a_bake_is_relit_for_no_copy_under_another_name(copied: str, room: Path, run: Run) -> None:
+    """Unless it is said that it may be replaced; the file that was baked relights it as before."""
+    relight = kept(room, run)
+    copy = room / "out" / "copy.blend" if copied.endswith("next to it") else room / "copy.blend"
+    shutil.copy(room / "room.blend" if copied == "the scene" else room / "out" / "baked.blend", copy)
+    before = tree(room)
+    code, told = run(relight[0], str(copy), *relight[2:])
+    assert code == 1
+    assert told.count("\n") == 1
+    assert "room.blend'" in told
+    assert f"--relight got scene 'Scene' of '{copy}': give the file that was baked" in told
+    assert changes(before, tree(room)) == []
+    assert run(*relight)[0] == 0
+    assert run(relight[0], str(copy), *relight[2:], "--overwrite")[0] == 0
+
+
+def test_a_renamed_copy_is_relit_from_the_panel_by_its_own_bake_alone(room: Path) -> None:
+    bpy.context.scene.radiosity_relight.sidecar = True
+    bake()
+    bpy.ops.wm.save_mainfile()
+    shutil.copy(room / "room.blend", room / "copy.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(room / "copy.blend"))
+    before = tree(room)
+    next(obj for obj in bpy.data.objects if obj.type == "LIGHT").data.energy *= 2.0
+    with pytest.raises(RuntimeError, match=r"no report of this file and scene lists .*: bake again"):
+        bpy.ops.radiosity.relight("EXEC_DEFAULT", True)
+    assert changes(before, tree(room)) == []
+    bake()  # its own files, next to those of the other
+    after = tree(room)
+    assert {name: after[name] for name in before} == before
+    assert len(after) > len(before)
+
+
 @pytest.mark.parametrize("change", ["a vertex", "a place"])
 def test_a_changed_geometry_is_noticed(change: str, room: Path, run: Run) -> None:
     relight = kept(room, run)

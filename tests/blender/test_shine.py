@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.files.files import empty_scene
 from radiosity_addon.blender.material_copies.copy_marks import behind_ours
 from radiosity_addon.blender.material_copies.lightmap_materials import show_lightmaps
@@ -53,8 +54,8 @@ LAYERED = {
     "metal": painted(Metallic=1.0, Roughness=0.3),
     "subsurface metal": painted(Subsurface_Weight=1.0, Metallic=1.0),
 }
-NOT_PARTED = {"grouped", "muted link", "no output", "glass", "half a metal"}
-"""Those that stay matte, that are black, and that are part of both."""
+NOT_PARTED = {"grouped", "muted link", "no output", "glass"}
+"""Those that stay matte, and that are black."""
 
 DIFFUSE = {
     "no specular": painted(Specular_IOR_Level=0.0),
@@ -102,6 +103,32 @@ def test_in_even_light_it_looks_so_from_the_side(kind: str, degrees: int, tmp_pa
     np.testing.assert_allclose(
         seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1)), expected, rtol=0.02
     )
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize("degrees", [0, 60])
+@pytest.mark.parametrize("level", [0.0, 0.5])
+@pytest.mark.parametrize("metallic", [0.0, 0.25, 0.5, 0.75, 1.0])
+def test_what_is_a_metal_in_part_looks_as_unbaked(
+    metallic: float, level: float, degrees: int, tmp_path: Path
+) -> None:
+    """In the light of the sky, and in that of a lamp with little of it; lamps add nothing that is diffuse."""
+    paint = principled_material(Metallic=metallic, Specular_IOR_Level=level, Roughness=0.4)
+    plane = add_plane(material=paint)
+    plane.rotation_euler.x, plane.scale = np.radians(degrees), (9.0, 9.0, 9.0)
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    shown = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=0.04)
+    restore(bpy.context)
+    set_world(0.25, 0.25, 0.25)
+    add_lamp("SUN", energy=3.0, transform={"rotation_euler": (np.radians(degrees - 40.0), 0.0, 0.0)})
+    received = 0.25 + 3.0 * np.cos(np.radians(40.0)) / np.pi
+    expected = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    bake_by_hand(((received,) * 3,), show="shine")
+    shown = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=0.015)
 
 
 @pytest.mark.parametrize("kind", DIFFUSE)
@@ -156,6 +183,75 @@ def test_a_normal_map_turns_the_highlight(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(mirrored, TEXEL), rtol=1e-3)
 
 
+def added(kind: str, place: str, mix: str = "Add") -> Material:
+    """A Diffuse BSDF and one that shines, through a shader that joins them.
+
+    place: "flat"; "shared", of one color node; "group", in a node group; "below", with a second Add Shader.
+    """
+    material = principled_material()
+    tree = material.node_tree
+    output = shader(material, "OUTPUT_MATERIAL").inputs["Surface"]
+    tree.nodes.remove(shader(material))
+    if place == "group":
+        tree = bpy.data.node_groups.new("Inside", "ShaderNodeTree")
+        tree.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+        node = material.node_tree.nodes.new("ShaderNodeGroup")
+        node.node_tree = tree
+        material.node_tree.links.new(node.outputs[0], output)
+        output = tree.nodes.new("NodeGroupOutput").inputs[0]
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", Color=(*BASE, 1.0))
+    gloss = add_node(tree, f"ShaderNodeBsdf{kind}", Color=(0.3, 0.6, 0.2, 1.0), Roughness=0.3)
+    if place == "shared":
+        color = tree.nodes.new("ShaderNodeRGB")
+        color.outputs[0].default_value = GREEN
+        for reader in (diffuse, gloss):
+            tree.links.new(color.outputs[0], reader.inputs["Color"])
+    join = tree.nodes.new(f"ShaderNode{mix}Shader")
+    first = 1 if mix == "Mix" else 0
+    tree.links.new(diffuse.outputs[0], join.inputs[first])
+    tree.links.new(gloss.outputs[0], join.inputs[first + 1])
+    if place == "below":
+        outer = tree.nodes.new("ShaderNodeAddShader")
+        tree.links.new(join.outputs[0], outer.inputs[0])
+        tree.links.new(
+            add_node(tree, "ShaderNodeBsdfTransparent", Color=(0.0,) * 4).outputs[0], outer.inputs[1]
+        )
+        join = outer
+    tree.links.new(join.outputs[0], output)
+    return material
+
+
+@pytest.mark.one_blender
+@pytest.mark.parametrize(
+    ("kind", "place", "mix"),
+    [
+        ("Sheen", "flat", "Add"),
+        ("Sheen", "group", "Add"),
+        ("Sheen", "flat", "Mix"),
+        ("Glossy", "flat", "Add"),
+        ("Glossy", "shared", "Add"),
+        ("Glossy", "below", "Add"),
+        ("Glossy", "group", "Mix"),
+    ],
+)
+def test_what_shines_next_to_a_diffuse_shader_stays(kind: str, place: str, mix: str, tmp_path: Path) -> None:
+    """In a light that comes from all sides, and in that of a lamp, seen from the side."""
+    plane = add_plane(material=added(kind, place, mix))
+    plane.rotation_euler.x, plane.scale = np.radians(50), (9.0, 9.0, 9.0)
+    received = 3.0 * np.cos(np.radians(50.0)) / np.pi
+    set_world(*WHITE)
+    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    bake_by_hand((WHITE,), show="shine")
+    shown = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=0.01)
+    restore(bpy.context)
+    bpy.context.scene.world = None
+    add_lamp("SUN", energy=3.0, transform={"rotation_euler": (np.radians(100.0), 0.0, 0.0)})
+    expected = seen_from_above(tmp_path, 2, samples=256)
+    bake_by_hand(((received,) * 3,), show="shine")
+    np.testing.assert_allclose(seen_from_above(tmp_path, 2, samples=256), expected, rtol=0.01)
+
+
 def other_color(copy: Material) -> None:
     color_node(copy).default_value = GREEN
 
@@ -179,25 +275,53 @@ def bump(copy: Material) -> None:
     copy.node_tree.links.new(normal.outputs[0], shader(copy).inputs["Normal"])
 
 
-def polish(copy: Material) -> None:
-    shader(copy).inputs["Coat Roughness"].default_value = 0.25
+def set_layer(name: str, value: object) -> Callable[[Material], None]:
+    """Where the panel shows it."""
+
+    def edit(copy: Material) -> None:
+        constant_of(shader(copy).inputs[name]).default_value = value
+
+    edit.__name__ = name
+    return edit
 
 
-@pytest.mark.parametrize("edit", [other_color, other_texture, turn_to_metal, glow, bump, polish])
+LAYERS = [
+    set_layer("Roughness", 0.0),
+    set_layer("IOR", 3.0),
+    set_layer("Specular IOR Level", 1.0),
+    set_layer("Specular Tint", (0.5, 0.25, 0.0, 1.0)),
+    set_layer("Coat Weight", 1.0),
+    set_layer("Coat Roughness", 1.0),
+    set_layer("Coat IOR", 4.0),
+    set_layer("Coat Tint", (1.0, 0.0, 0.0, 1.0)),
+]
+
+
+@pytest.mark.parametrize("edit", [other_color, other_texture, turn_to_metal, glow, bump, *LAYERS])
 def test_an_edit_shows_at_once_as_after_another_bake(
     edit: Callable[[Material], None], tmp_path: Path
 ) -> None:
-    paint = principled_material(Coat_Weight=0.25)
-    add_plane(material=paint)
-    set_world(*WHITE)
+    paint = principled_material(Coat_Weight=0.25, Specular_IOR_Level=0.75)
+    plane = add_plane(material=paint)
+    plane.rotation_euler.x, plane.scale = np.radians(60), (9.0, 9.0, 9.0)
     bake_by_hand(show="shine")
-    before = seen_from_above(tmp_path)
+
+    def seen() -> np.ndarray:
+        return seen_from_above(tmp_path, samples=64)
+
+    # Without a world all that is seen is the lightmap, by what the layers leave of it.
+    before = seen()
+    set_world(*WHITE)
     edit(copy_of(paint))
-    at_once = seen_from_above(tmp_path)
-    assert edit in (bump, polish) or not np.allclose(at_once, before, rtol=0.02)
+    lit_at_once = seen()
+    bpy.context.scene.world = None
+    at_once = seen()
+    assert edit is bump or not np.allclose(at_once, before, rtol=2e-3)
     assert carry_material_edits() == ()
     bake_by_hand(show="shine")
-    np.testing.assert_allclose(seen_from_above(tmp_path), at_once, rtol=2e-3)
+    np.testing.assert_allclose(seen(), at_once, rtol=1e-5, atol=1e-7)
+    set_world(*WHITE)
+    np.testing.assert_allclose(seen(), lit_at_once, rtol=2e-3)
 
 
 def test_materials_of_an_earlier_version_stay_matte(tmp_path: Path) -> None:

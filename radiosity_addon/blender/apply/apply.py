@@ -107,7 +107,7 @@ def apply_steps(
             yield (number + 1) / len(replacements)
         earlier.take_off(changed_objects(replacements))
         show(context, replacements)
-        return left_behind(context, baked_at)
+        return (*materials.warnings, *left_behind(context, baked_at))
     except BaseException:
         earlier.show_again()
         remove_datablocks([block for block in made_datablocks() if block not in before])

@@ -11,6 +11,7 @@ from ...base import BakeWarning
 from ..datablocks.bake_record import made_datablocks, recorded_objects
 from ..stand_ins.stand_ins import INSTANCER
 from .edits import carry_edits
+from .lamp_highlights import put_unused_back
 from .scopes import scene_of
 from .shown_state import sharing, showing, take_off, take_off_unused
 from .sweep import sweep
@@ -38,6 +39,7 @@ def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> 
     scene: None restores the whole file. Objects of no scene go with any of them.
     """
     if next(made_datablocks(), None) is None and not recorded_objects():
+        put_unused_back()
         return RestoreResult(0, ())
     warnings = carry_edits(context)
     shown = showing()
@@ -48,6 +50,7 @@ def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> 
     take_off(shown)
     take_off_unused()
     sweep(stand_ins)
+    put_unused_back()
     context.view_layer.update()
     return RestoreResult(count, warnings)
 

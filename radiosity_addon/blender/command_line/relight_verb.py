@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,17 @@ from ...bake import BakeDigests, KeepOptions, timed
 from ...bake.relight import strengths_in
 from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
-from ...base import BakeWarning, Status, UsageError, staged
+from ...base import BakeError, BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
-from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
+from ...files import (
+    BLEND_NAME,
+    OWNER,
+    PREVIEW_NAME,
+    REPORT_NAME,
+    SIDECAR_NAME,
+    NoReportError,
+    read_report,
+)
 from ...options import OPTIONS, BakeSettings, Form
 from ..apply.rebake import Originals
 from ..files.output import OutputFolder
@@ -25,7 +34,7 @@ from ..jobs.preview import QUICK_SAMPLES
 from ..relight.relight_scene import lit
 from ..scene_export.export import export_steps
 from .export_places import check_export
-from .verbs import open_or_build, output_of, registered, run_through, same_file, written_files
+from .verbs import command_owner, open_or_build, output_of, registered, run_through, same_file, written_files
 
 EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
 """How far the whole is when each part begins; rough."""
@@ -77,6 +86,8 @@ def relight(
                 "leave these out, or bake again"
             )
         notes = open_or_build(scene, loaded, allowed)
+        if not allowed.overwrite:
+            _check_same_scene(output, source)
         folder = output_of(output, source, allowed, report_copy)
         if form is not None:
             check_export(output, form, stored.settings.quantity, allowed)
@@ -86,6 +97,25 @@ def relight(
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)
         console.lines(summary(str(output), files, report.as_dict()))
+
+
+def _check_same_scene(output: Path, source: Path | None) -> None:
+    """Refuse the bake of another file, or scene, than the open one: also of a copy under another name.
+
+    Raises
+    ------
+    BakeError
+    """
+    owner = command_owner(source)
+    with suppress(FileNotFoundError, NoReportError):  # refused later, as what stands in the way of any bake
+        report = read_report(output / REPORT_NAME)
+        if not owner.owns(report, output):
+            said = report[OWNER]
+            raise BakeError(
+                f"'{output / REPORT_NAME}' is of scene '{said['scene']}' of '{said['file']}', but --relight "
+                f"got scene '{owner.scene}' of '{owner.source}': give the file that was baked, bake this one "
+                "into another folder, or give --overwrite if it is the same file, renamed"
+            )
 
 
 def _other_flags(given: BakeSettings, of_bake: BakeSettings) -> list[str]:

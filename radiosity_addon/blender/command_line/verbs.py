@@ -13,7 +13,7 @@ from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, Interrupts, Permissions, summary
-from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
+from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
 from ..files.cornell import build_cornell_box
@@ -131,6 +131,12 @@ def _places(report_copy: Path | None, plot: Path | None) -> dict[str, Path]:
     return {option: path for option, path in given.items() if path is not None}
 
 
+def command_owner(source: Path | None) -> Owner:
+    """Return who a bake of the open scene belongs to, which came from a file or is the bundled one."""
+    came_from = CORNELL_BOX if source is None else str(source.expanduser().resolve())
+    return owner_of(bpy.context.scene, came_from)
+
+
 def output_of(
     output: Path,
     source: Path | None,
@@ -144,8 +150,7 @@ def output_of(
     ------
     BakeError
     """
-    came_from = CORNELL_BOX if source is None else str(source.expanduser().resolve())
-    owner = owner_of(bpy.context.scene, came_from)
+    owner = command_owner(source)
     if report_copy is not None:
         check_existing("--report", report_copy, allowed.overwrite, owner_record(owner, output))
     if plot is not None:

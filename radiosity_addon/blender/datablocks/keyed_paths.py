@@ -30,12 +30,21 @@ def move_keys(tree: bpy.types.NodeTree, before: str, after: str) -> None:
 
 
 def curves(owner: bpy.types.ID) -> Iterator[bpy.types.FCurve]:
-    """Yield all drivers of a datablock, and all curves of its action."""
+    """Yield all drivers of a datablock, and all curves of its action and of its strips' actions."""
     data = owner.animation_data
     if data is None:
         return
     yield from data.drivers
-    action = data.action
+    yield from _curves_for(data.action, getattr(data, "action_slot", None))
+    for track in data.nla_tracks:
+        for strip in track.strips:
+            yield from _curves_for(strip.action, getattr(strip, "action_slot", None))
+
+
+def _curves_for(
+    action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None
+) -> Iterator[bpy.types.FCurve]:
+    """Yield an action's curves; of one with slots those of a slot, or of all where it is not known."""
     if action is None:
         return
     if hasattr(action, "fcurves"):  # until Blender 5.0
@@ -44,5 +53,5 @@ def curves(owner: bpy.types.ID) -> Iterator[bpy.types.FCurve]:
     for layer in action.layers:
         for strip in layer.strips:
             for bag in strip.channelbags:
-                if data.action_slot is None or bag.slot_handle == data.action_slot.handle:
+                if slot is None or bag.slot_handle == slot.handle:
                     yield from bag.fcurves

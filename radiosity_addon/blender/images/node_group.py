@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -67,6 +67,33 @@ def show_in_groups(look: str) -> None:
             _show(tree, look)
 
 
+def is_shown_by_all(look: str) -> bool:
+    """Whether all groups of this file show a look, as far as they can; appended ones may show another."""
+    trees = [tree for tree in _groups() if tree.get(_KIND) is not None]
+    return all(_shown(tree) == _node_of(tree, look).name for tree in trees)
+
+
+def libraries_showing_others(look: str) -> list[bpy.types.Library]:
+    """Return the libraries with groups that show another look, which this file cannot change."""
+    trees = [
+        tree for tree in bpy.data.node_groups if tree.library is not None and tree.get(_KIND) is not None
+    ]
+    others = [tree for tree in trees if tree.users and _shown(tree) != _node_of(tree, look).name]
+    return list(dict.fromkeys(tree.library for tree in others))
+
+
+def looks_of_groups() -> dict[int, str]:
+    """Return the look that each group shows, by its `session_uid`."""
+    return {tree.session_uid: _shown(tree) for tree in _groups() if tree.get(_KIND) is not None}
+
+
+def put_looks_back(looks: Mapping[int, str]) -> None:
+    """Have the groups that are still there show what they showed; see `looks_of_groups`."""
+    for tree in _groups():
+        if tree.session_uid in looks:
+            _show(tree, looks[tree.session_uid])
+
+
 @contextmanager
 def matte_groups() -> Iterator[None]:
     """Have groups that show the shine be matte as long as this lasts."""
@@ -93,8 +120,11 @@ def _shown(tree: bpy.types.NodeTree) -> str:
 
 
 def _show(tree: bpy.types.NodeTree, look: str) -> None:
-    node = tree.nodes.get(look) or tree.nodes[MATTE]
-    tree.links.new(node.outputs[0], _result(tree))
+    tree.links.new(_node_of(tree, look).outputs[0], _result(tree))
+
+
+def _node_of(tree: bpy.types.NodeTree, look: str) -> bpy.types.Node:
+    return tree.nodes.get(look) or tree.nodes[MATTE]
 
 
 def _declare_sockets(tree: bpy.types.NodeTree, see_through: bool) -> None:

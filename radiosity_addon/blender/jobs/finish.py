@@ -32,7 +32,7 @@ from ..material_copies.light_shares import crowded_materials
 from ..relight import kept_bakes, lightmap_versions
 from ..scene_records.export_sources import Export
 from ..session import kept_details, last_bake
-from ..settings.properties import show_look_of
+from ..settings.properties import looks_put_back, show_look_of
 from .preview import SAMPLES, render_preview
 
 BakeJob = Generator[Status, None, BakeReport]
@@ -123,7 +123,7 @@ def finish(
         None writes no copies; they need an output.
     """
     scene = context.scene
-    with ExitStack() as undo:
+    with looks_put_back(), ExitStack() as undo:
         undo.enter_context(_memory_put_back(scene))
         earlier = undo.enter_context((scope or Scope()).replacing_earlier(context))
         with timed(seconds, "apply"):
@@ -218,7 +218,7 @@ def _show(
         if keeping is not None:
             kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
         behind = yield from apply_steps(context, export, result, images, settings, groups, earlier)
-        show_look_of(context.scene)
+        behind = (*behind, *show_look_of(context.scene))
     except BaseException:
         remove_datablocks([*images, *each_image(groups)])
         raise

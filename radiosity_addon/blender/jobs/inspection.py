@@ -35,6 +35,7 @@ from ...scene import LIGHTMAP_UV_LAYER
 from ..apply.rebake import originals_shown
 from ..cycles.surface_evaluation import foreseen_bytes
 from ..files.foreseen_files import file_refusal
+from ..material_copies.lightmap_materials import linked_looks
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
 from ..scene_export.export import all_glass, check_names, chosen_pieces
@@ -42,6 +43,7 @@ from ..scene_export.page_checks import check_pages
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
+from ..settings.properties import look_of
 from .lit_objects import PieceShape, glass_materials, lit_objects, lit_sides, piece_shape
 from .shape_checks import coincident_warnings, inside_out_warnings, unlit_scene
 
@@ -169,6 +171,7 @@ def inspect(
         *_of_glass(collected),
         *_of_visibility(context),
         *_of_layers(chosen, settings),
+        *(Finding(WARNING, each.name, each.message) for each in linked_looks(look_of(context.scene))),
         *_of_texels(lit, plan, settings),
         *_of_scales(collected),
         *_of_size(shapes),

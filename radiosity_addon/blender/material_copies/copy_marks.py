@@ -55,7 +55,7 @@ VALUE = "radiosity_value"
 """On a node that we added: the constant of a socket, which is read from this node, as it was then."""
 
 THROUGH = "radiosity_through"
-"""On a node that we added: what feeds its first input fed, before, what it feeds."""
+"""On a node that we added: what feeds an input fed, before, what the output feeds; see `passed_input`."""
 
 FOLLOWS = "radiosity_follows"
 """On a node that we added: node and input whose constant it repeats, where it cannot feed that."""
@@ -103,10 +103,27 @@ def linked_output(socket: bpy.types.NodeSocket) -> str:
     return f"{link.from_node.name}\n{link.from_socket.identifier}"
 
 
+def followed_socket(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    """Return the input of a tree, our copy or the original, whose constant a node of ours repeats."""
+    name, identifier = node[FOLLOWS]
+    reader = tree.nodes.get(name)
+    inputs = () if reader is None else reader.inputs
+    return next((socket for socket in inputs if socket.identifier == identifier), None)
+
+
+def passed_input(output: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """Return the input that stands for an output of a node marked as `THROUGH`.
+
+    It is the one of the same name, else the first.
+    """
+    inputs = output.node.inputs
+    return inputs.get(output.name) or inputs[0]
+
+
 def behind_ours(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Return the input that takes what an input would take without the nodes that we put in between."""
     while socket.is_linked and socket.links[0].from_node.get(THROUGH):
-        socket = socket.links[0].from_node.inputs[0]
+        socket = passed_input(socket.links[0].from_socket)
     return socket
 
 
@@ -116,9 +133,10 @@ def users_inputs(output: bpy.types.NodeSocket) -> Iterator[bpy.types.NodeSocket]
         node = link.to_node
         if not is_added(node):
             yield link.to_socket
-        elif node.get(THROUGH) and link.to_socket == node.inputs[0]:
+        elif node.get(THROUGH):
             for passed in node.outputs:
-                yield from users_inputs(passed)
+                if passed_input(passed) == link.to_socket:
+                    yield from users_inputs(passed)
 
 
 def is_copied_group(tree: bpy.types.NodeTree | None) -> bool:

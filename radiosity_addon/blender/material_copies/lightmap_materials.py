@@ -8,10 +8,12 @@ so that it can be edited as the original can; `material_edits.py` carries such e
 from __future__ import annotations
 
 import uuid
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 
+from ...base import BakeWarning
 from ...numerics import brdf_of_reflectance, radiance_of_radiosity
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import ORIGINAL, is_made, mark_made
@@ -30,7 +32,10 @@ from ..images.node_group import (
     SCALE,
     SHADER,
     SURFACE,
+    libraries_showing_others,
     lightmap_group,
+    looks_of_groups,
+    put_looks_back,
     show_in_groups,
 )
 from ..materials.materials import is_volume, read_material, uses_nodes
@@ -50,6 +55,7 @@ from .copy_marks import (
 )
 from .copy_record import record
 from .false_colors import false_colors
+from .followed_values import follow_keys, is_animated
 from .light_shares import LightShares
 from .parted_surfaces import PartedSurfaces
 from .surface_nodes import SurfaceSockets, feed_color, feed_float
@@ -66,6 +72,10 @@ RADIANCE_PER_TEXEL = {
 residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
 
 
+HOLDS_REFLECTED = ("radiosity", "residual")
+"""Quantities that hold what the surface reflects and emits already, and so does its error."""
+
+
 class LightmapMaterials:
     """Makes the lightmap copies of materials for one bake, each once; `shares` where it has light groups."""
 
@@ -74,6 +84,12 @@ class LightmapMaterials:
         self._shares = shares
         self._made: dict[tuple[Any, ...], bpy.types.Material] = {}
         self._glows: dict[bpy.types.Material | None, bool] = {}
+        self._still: dict[str, BakeWarning] = {}
+
+    @property
+    def warnings(self) -> tuple[BakeWarning, ...]:
+        """Those of materials whose keyframes and drivers do not show."""
+        return tuple(self._still.values())
 
     def copy_of(
         self,
@@ -137,12 +153,27 @@ class LightmapMaterials:
                 self._glows[material], copy[GROUP] = True, group
             if index == 0:
                 _skip_light_sampling(copy, surface)
+        if material is not None and is_animated(tree):
+            self._warn_of_still(material.name, reader.is_parted)
         mark_added(tree, before)
         tree.nodes.active = active
         for inner in dict.fromkeys(copied_groups(tree)):
             mark_added(inner, {node.name for node in inner[ORIGINAL].nodes})
+        follow_keys(copy)
         record_content()
         return copy
+
+    def _warn_of_still(self, name: str, is_parted: bool) -> None:
+        """Warn of an animated material if its lightmap stays as it was baked."""
+        if self._quantity in HOLDS_REFLECTED:
+            reason = f"the quantity '{self._quantity}' holds reflected light; bake 'irradiance_over_pi'"
+        elif not is_parted:
+            reason = "its shader is of a kind that cannot be read; use a Principled BSDF"
+        else:
+            return
+        frame = bpy.context.scene.frame_current
+        message = f"material '{name}' is animated, but its lightmap shows it as at frame {frame}: {reason}"
+        self._still[name] = BakeWarning(name, message)
 
     def _wire(
         self,
@@ -164,8 +195,7 @@ class LightmapMaterials:
         texture.interpolation = "Linear"
         texture.location = (x, y + 450)
         group = tree.nodes.new("ShaderNodeGroup")
-        # Radiosity already holds what the surface reflects and emits, and so does its error.
-        holds_all = self._quantity in ("radiosity", "residual")
+        holds_all = self._quantity in HOLDS_REFLECTED
         see_through = surface.alpha != 1.0
         group.node_tree = lightmap_group(is_parted and not holds_all, see_through)
         group.name = group.label = group.node_tree.name
@@ -206,11 +236,50 @@ def show_lightmaps(look: str) -> int:
     count = 0
     for material in bpy.data.materials:
         if is_made(material) and material.node_tree is not None:
-            for node in material.node_tree.nodes:
-                if node.type == "GROUP" and node.node_tree is not None and LIGHTMAP_ONLY in node.inputs:
-                    node.inputs[LIGHTMAP_ONLY].default_value = float(look == LOOK_LIGHTMAP)
+            for socket in _earlier_switches(material):
+                socket.default_value = float(look == LOOK_LIGHTMAP)
             count += 1
     return count
+
+
+def linked_looks(look: str) -> tuple[BakeWarning, ...]:
+    """Warn of files whose linked materials show another look than this one's."""
+    return tuple(
+        BakeWarning(
+            library.name,
+            f"lightmaps linked from '{library.filepath}' are shown differently from this file's, which show "
+            f"'{look}': open that file, choose Show there, and reload",
+        )
+        for library in libraries_showing_others(look)
+    )
+
+
+def looks_kept() -> Callable[[], None]:
+    """Return what makes all lightmap materials of now, as far as they still exist, look as they do now."""
+    groups = looks_of_groups()
+    materials = {
+        material.session_uid: [socket.default_value for socket in _earlier_switches(material)]
+        for material in bpy.data.materials
+        if is_made(material) and material.node_tree is not None
+    }
+
+    def put_back() -> None:
+        put_looks_back(groups)
+        for material in bpy.data.materials:
+            if materials.get(material.session_uid):
+                values = materials[material.session_uid]
+                for socket, value in zip(_earlier_switches(material), values, strict=True):
+                    socket.default_value = value
+
+    return put_back
+
+
+def _earlier_switches(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
+    """Return the inputs by which a material of an earlier version shows the lightmap alone."""
+    groups = [
+        node for node in material.node_tree.nodes if node.type == "GROUP" and node.node_tree is not None
+    ]
+    return [node.inputs[LIGHTMAP_ONLY] for node in groups if LIGHTMAP_ONLY in node.inputs]
 
 
 def _make_plain_nodes(material: bpy.types.Material, color: Any) -> None:

@@ -6,7 +6,7 @@ The name, places of nodes, selections and open panels do not count. Node groups 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from operator import attrgetter
 from typing import Any, TypeAlias
@@ -17,7 +17,7 @@ from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.keyed_paths import curves, path_of
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR, EMISSION
 from ..materials.materials import uses_nodes
-from .copy_marks import COPY_MARKS, FED, NODE_MARKS, is_added, is_copied_group
+from .copy_marks import COPY_MARKS, FED, FOLLOWS, NODE_MARKS, is_added, is_copied_group
 
 Reader: TypeAlias = Callable[[Any], Any]
 Readers: TypeAlias = tuple[Reader, tuple[tuple[str, Reader], ...]]
@@ -49,10 +49,13 @@ def digest_of_material(material: bpy.types.Material, as_copy: bool = False) -> s
     as_copy: It is a lightmap copy: our copies of node groups count as those they are of, and of the nodes
         that we added only their links and what the user can set.
     """
-    content = [_read(material, _NOT_CONTENT), _custom(material, COPY_MARKS), _animation(material)]
+    keyed = frozenset(curve.data_path for curve in curves(material))
+    custom = [each for each in _custom(material, COPY_MARKS) if f'["{each[0]}"]' not in keyed]
+    content = [_read(material, _NOT_CONTENT | keyed), custom, _animation(material)]
     if uses_nodes(material):
         content.append(_tree(material.node_tree, as_copy))
-    return _hash(content)
+    # Drivers of a copy read from the copy what those of the original read from that.
+    return _hash(content, itself=repr(_plain(material)))
 
 
 def tree_digest(tree: bpy.types.NodeTree, as_copy: bool = False) -> str:
@@ -81,14 +84,19 @@ def animation_of(tree: bpy.types.NodeTree) -> Any:
     return _animation(tree)
 
 
-def _hash(content: Any) -> str:
-    return hashlib.blake2b(repr(content).encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+def _hash(content: Any, itself: str = "") -> str:
+    text = repr(content)
+    if itself:
+        text = text.replace(itself, "itself")
+    return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
 
 
 def _tree(tree: bpy.types.NodeTree, as_copy: bool) -> list[Any]:
     keyed = {curve.data_path for curve in curves(tree)}
     nodes = [_node(node, as_copy, keyed) for node in sorted(tree.nodes, key=_NAME)]
-    return [nodes, links_of(tree), _animation(tree)]
+    following = [node for node in tree.nodes if node.get(FOLLOWS) is not None] if as_copy and keyed else []
+    ours = {path_of(node.outputs[0]) for node in following if is_added(node)}
+    return [nodes, links_of(tree), _animation(tree, ours)]
 
 
 def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
@@ -146,15 +154,19 @@ def _custom(owner: Any, marks: tuple[str, ...]) -> list[tuple[str, Any]]:
     return [(key, _plain(owner[key])) for key in keys]
 
 
-def _animation(owner: bpy.types.ID) -> Any:
+def _animation(owner: bpy.types.ID, ours: Collection[str] = ()) -> Any:
+    """Return what moves a datablock's values, but for those of `ours`, by their paths."""
     data = owner.animation_data
     if data is None or (data.action is None and not data.drivers and not data.nla_tracks):
         return None
     action = None if data.action is None else data.action.name_full
-    moved = sorted((curve.data_path, curve.array_index) for curve in curves(owner))
+    moved = sorted(
+        (curve.data_path, curve.array_index) for curve in curves(owner) if curve.data_path not in ours
+    )
     drivers = sorted(
         repr((curve.data_path, curve.array_index, curve.mute, _read(curve.driver, _NOT_CONTENT - {"name"})))
         for curve in data.drivers
+        if curve.data_path not in ours
     )
     return [action, moved, drivers, [track.name for track in data.nla_tracks]]
 

@@ -11,10 +11,8 @@ from typing import Any
 
 import bpy
 
-from ..datablocks.keyed_paths import is_keyed
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR
-from ..images.shine_group import COLOR, GLOSSY_COLOR, LAYERS, METALLIC, TRANSMISSION, shine_group
-from ..materials.shader_nodes import feed_of
+from ..images.shine_group import COLOR, GLOSSY_COLOR, LAYERS, REPLACED, shine_group
 from ..materials.shader_terms import GLASS
 from .copy_marks import THROUGH
 from .surface_nodes import BLACK, ColorSource, SurfaceReader, SurfaceSockets, source_of
@@ -58,7 +56,10 @@ class PartedSurfaces(SurfaceReader):
             return source_of(place, color), BLACK
         parted = _part(place, color)
         for name in LAYERS if is_layered else ():
-            _repeat(place, node.inputs[name], parted.inputs[name])
+            if name in REPLACED:
+                _put_between(place, parted.inputs[name], parted.outputs[name], node.inputs[name])
+            else:
+                place.links.new(source_of(place, node.inputs[name]), parted.inputs[name])
         return parted.outputs[BASE_COLOR], parted.outputs[DIFFUSE_COLOR]
 
     def emitted(self, color: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> bpy.types.NodeSocket:
@@ -74,26 +75,26 @@ class PartedSurfaces(SurfaceReader):
 
 def _part(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.Node:
     """Put our node between a color and the input that takes it; returns the node."""
-    is_color = socket.type == "RGBA"  # else it is of a shader, and glows
-    if is_color and not socket.is_linked and not is_keyed(socket):
-        source_of(tree, socket)
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = shine_group()
     node.name, node.label = node.node_tree.name, f"{node.node_tree.name}: {socket.name}"
     node.location = (socket.node.location.x - 200, socket.node.location.y)
     node[THROUGH] = True
-    if is_color:
-        node.inputs[COLOR].default_value = socket.default_value
-    for link in list(socket.links):
-        tree.links.new(link.from_socket, node.inputs[COLOR]).is_muted = link.is_muted
-    tree.links.new(node.outputs[GLOSSY_COLOR], socket)
+    _put_between(tree, node.inputs[COLOR], node.outputs[GLOSSY_COLOR], socket)
     return node
 
 
-def _repeat(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
-    """Have our node take what the shader takes: a constant as it is now, but for those that matter much."""
-    feed = feed_of(socket, enter_groups=False)
-    if feed.node is not None or target.name in (METALLIC, TRANSMISSION):
-        tree.links.new(source_of(tree, socket), target)
-    else:
-        target.default_value = socket.default_value
+def _put_between(
+    tree: bpy.types.NodeTree,
+    taken: bpy.types.NodeSocket,
+    given: bpy.types.NodeSocket,
+    socket: bpy.types.NodeSocket,
+) -> None:
+    """Have an input of our node take what feeds a socket, or its constant, and an output feed the socket."""
+    if socket.type != "SHADER":  # else a color makes it glow
+        taken.default_value = socket.default_value
+        if not socket.is_linked:
+            tree.links.new(source_of(tree, socket), taken)
+    for link in list(socket.links):
+        tree.links.new(link.from_socket, taken).is_muted = link.is_muted
+    tree.links.new(given, socket)

@@ -139,7 +139,7 @@ class SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
     ) -> tuple[bpy.types.NodeSocket, bool]:
         """Return color × strength of two inputs, and whether it is not the constant 0."""
         inputs = node.inputs[color], node.inputs[strength]
-        glows = all(_linked(socket) or default_rgb(socket).any() for socket in inputs)
+        glows = all(_varies(socket) or default_rgb(socket).any() for socket in inputs)
         scaled = place.nodes.new("ShaderNodeVectorMath")
         scaled.operation = "SCALE"
         place.links.new(self.emitted(inputs[0], place), scaled.inputs["Vector"])
@@ -180,7 +180,7 @@ class SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
 def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:
     """Return a node's alpha; a constant 0 or 1 stays one, as it takes other shaders."""
     socket = node.inputs["Alpha"]
-    if not socket.is_linked and socket.default_value in (0.0, 1.0):
+    if not socket.is_linked and not is_keyed(socket) and socket.default_value in (0.0, 1.0):
         return float(socket.default_value)
     return source_of(tree, socket)
 
@@ -188,7 +188,8 @@ def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:
 def source_of(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Return the output that feeds an input: where nothing does, that of a new node with its constant.
 
-    The new node feeds the input too, unless muted links or nodes do in vain, or it is animated.
+    The new node feeds the input too, unless muted links or nodes do in vain, or it is animated: then the
+    node follows it (`followed_values.py`).
     """
     feed = feed_of(socket, enter_groups=False)
     if feed.node is not None:
@@ -207,10 +208,10 @@ def source_of(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.typ
     return output
 
 
-def _linked(socket: bpy.types.NodeSocket) -> bool:
-    """Whether something feeds a socket that is not a constant of ours."""
+def _varies(socket: bpy.types.NodeSocket) -> bool:
+    """Whether something feeds or animates a socket that is not a constant of ours."""
     node = feed_of(socket, enter_groups=False).node
-    return node is not None and node.get(VALUE) is None
+    return is_keyed(socket) if node is None else node.get(VALUE) is None
 
 
 def _mixed(

@@ -12,6 +12,7 @@ from ..material_copies.copy_marks import (
     NODE_MARKS,
     VALUE,
     behind_ours,
+    followed_socket,
     is_copied_group,
 )
 from ..material_copies.material_digest import (
@@ -66,9 +67,7 @@ def take_values(
         if sockets is None and node.type in OUTPUTS_WITH_VALUES:
             _set(twin.outputs[0], node.outputs[0].default_value)
     for node in copy.nodes:
-        follows = node.get(FOLLOWS)
-        twin = None if follows is None else original.nodes.get(follows[0])
-        socket = None if twin is None else next((s for s in twin.inputs if s.identifier == follows[1]), None)
+        socket = None if node.get(FOLLOWS) is None else followed_socket(original, node)
         if socket is not None and (sockets is None or socket.name in sockets):
             _set(node.outputs[0], socket.default_value)
 
@@ -78,10 +77,11 @@ def _take(copied: bpy.types.NodeSocket, value: Any) -> None:
     reader = behind_ours(copied)
     if reader.is_linked:
         node = reader.links[0].from_node
-        if node.get(VALUE) is None:
+        if node.get(VALUE) is not None:
+            node[VALUE] = list(value) if hasattr(value, "__len__") else [value]
+            _set(node.outputs[0], value)
+        elif node.get(FOLLOWS) is None:
             return
-        node[VALUE] = list(value) if hasattr(value, "__len__") else [value]
-        _set(node.outputs[0], value)
     elif reader != copied:
         _set(reader, value)
     _set(copied, value)

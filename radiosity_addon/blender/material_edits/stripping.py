@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..datablocks.bake_record import ORIGINAL, is_made
-from ..datablocks.keyed_paths import move_keys, path_of
+from ..datablocks.keyed_paths import is_keyed, move_keys, path_of
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR, EMISSION, SHADER, SURFACE
 from ..material_copies.copy_marks import (
     COPY_MARKS,
@@ -19,6 +19,7 @@ from ..material_copies.copy_marks import (
     is_added,
     is_copied_group,
     linked_output,
+    passed_input,
     users_inputs,
 )
 from ..materials.shader_nodes import feed_of
@@ -75,6 +76,9 @@ def strip_tree(tree: bpy.types.NodeTree) -> bool:
     for source, target in outward:
         _reconnect(tree, source, target)
     for name in added:
+        for output in tree.nodes[name].outputs:
+            if is_keyed(output):
+                output.driver_remove("default_value")
         tree.nodes.remove(tree.nodes[name])
     for node in tree.nodes:
         if node.type == "GROUP" and is_copied_group(node.node_tree):
@@ -97,7 +101,9 @@ def _reconnect(tree: bpy.types.NodeTree, source: bpy.types.NodeSocket, target: b
     link = target.links[0]
     is_muted = link.is_muted and not is_lightmap_node(node)
     while is_added(node):
-        before = node.inputs[0] if node.get(THROUGH) or is_lightmap_node(node) else None
+        before = passed_input(source) if node.get(THROUGH) else None
+        if is_lightmap_node(node):
+            before = node.inputs[SURFACE]
         if before is None or not before.is_linked:
             tree.links.remove(link)
             return

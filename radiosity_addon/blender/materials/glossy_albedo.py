@@ -67,14 +67,24 @@ def dielectric_seen(
     return algebra.saturate(_layer(algebra, ior, level, roughness, algebra.calculate("ADD", *parts)))
 
 
-def _layer(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, grazing: Scalar) -> Scalar:
-    """Return what a dielectric reflects; `grazing` is what Fresnel adds to one that is black face on."""
+def dielectric_normal(algebra: NodeAlgebra, ior: Scalar, level: Scalar) -> Scalar:
+    """Return what a dielectric reflects of light that comes along the normal."""
     calculate = algebra.calculate
     ratio = calculate("DIVIDE", calculate("SUBTRACT", ior, 1.0), calculate("ADD", ior, 1.0))
     normal = calculate("MULTIPLY", calculate("MULTIPLY", ratio, ratio), calculate("MULTIPLY", level, 2.0))
-    normal = algebra.saturate(normal)
-    share = calculate("DIVIDE", normal, calculate("ADD", normal, _FAINT))
-    share = calculate("MULTIPLY", share, algebra.complement(normal))
+    return algebra.saturate(normal)
+
+
+def dielectric_rise(algebra: NodeAlgebra, normal: Scalar) -> Scalar:
+    """Return how far a dielectric rises to 1 at grazing angles: not at all where it reflects nothing."""
+    return algebra.calculate("DIVIDE", normal, algebra.calculate("ADD", normal, _FAINT))
+
+
+def _layer(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar, grazing: Scalar) -> Scalar:
+    """Return what a dielectric reflects; `grazing` is what Fresnel adds to one that is black face on."""
+    calculate = algebra.calculate
+    normal = dielectric_normal(algebra, ior, level)
+    share = calculate("MULTIPLY", dielectric_rise(algebra, normal), algebra.complement(normal))
     added = calculate("MULTIPLY", share, grazing)
     return calculate("ADD", calculate("MULTIPLY", normal, _white(algebra, roughness)), added)
 

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 
-from ...base import UsageError
+from ...base import BakeWarning, UsageError
 from ...options import PANEL_OPTIONS, BakeSettings
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES
 from .option_properties import OptionProperties, chosen_options, option_property
 from .preferences import memory_limit_of, threads_of
 
+_LOOK = ("show", "highlights")
+"""What scenes say of the look."""
+
+_counts: list[int] = []
+"""Scenes, objects and node groups when their looks were united last."""
+
+_quiet: list[bool] = []
+"""Not empty while that changes without the look itself."""
+
 
 def _show(settings: RadiositySettings, _context: bpy.types.Context) -> None:
-    show_look_of(settings.id_data)
+    if not _quiet:
+        show_look_of(settings.id_data)
 
 
 class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
     """`scene.radiosity`: the options of the next bake, and a memory of the last one."""
 
     show: option_property(PANEL_OPTIONS["show"], update=_show)  # type: ignore[valid-type]
+    highlights: option_property(PANEL_OPTIONS["highlights"], update=_show)  # type: ignore[valid-type]
     lightmap_only: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Lightmap Only",
         description="What files of earlier versions have for Show",
@@ -43,19 +57,96 @@ class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
 
 def look_of(scene: bpy.types.Scene) -> str:
     """Return how a scene shows its lightmaps; one without settings stays without."""
-    default = PANEL_OPTIONS["show"].default
-    return scene.radiosity.show if scene.is_property_set("radiosity") else str(default)
+    return str(_said_by(scene, "show"))
 
 
-def show_look_of(scene: bpy.types.Scene) -> None:
-    """Show all lightmaps of the file as a scene asks; its other scenes say the same from then on."""
-    from ..material_copies.lightmap_materials import show_lightmaps
+def show_look_of(scene: bpy.types.Scene) -> tuple[BakeWarning, ...]:
+    """Show all lightmaps of the file as a scene asks; its other scenes say the same from then on.
 
-    look = look_of(scene)
-    show_lightmaps(look)
-    for other in bpy.data.scenes:
-        if other.library is None and look_of(other) != look:
-            other.radiosity.show = look
+    Returns warnings: Of what is linked and keeps another look, and of lamps whose highlights stay.
+    """
+    from ..apply.lamp_highlights import show_highlights
+    from ..material_copies.lightmap_materials import linked_looks, show_lightmaps
+
+    show_lightmaps(look_of(scene))
+    highlights = show_highlights(bool(_said_by(scene, "highlights")))
+    with _quietly():
+        for other in bpy.data.scenes:
+            for name in _LOOK if other.library is None else ():
+                if _said_by(other, name) != _said_by(scene, name):
+                    setattr(other.radiosity, name, _said_by(scene, name))
+    return (*linked_looks(look_of(scene)), *highlights)
+
+
+def unite_looks(_: object = None) -> None:
+    """Have what was appended be shown as the open scene shows its own."""
+    from ..apply.lamp_highlights import show_highlights
+    from ..images.node_group import is_shown_by_all
+
+    scene = bpy.context.scene
+    if scene is None:
+        return
+    scenes = [other for other in bpy.data.scenes if other.library is None]
+    said_alike = all(_said_by(other, name) == _said_by(scene, name) for other in scenes for name in _LOOK)
+    if not said_alike or not is_shown_by_all(look_of(scene)):
+        show_look_of(scene)
+    elif _said_by(scene, "highlights"):
+        show_highlights(True)
+
+
+def unite_looks_of_more(_: object = None) -> None:
+    """Do so if there is more or less in the file than at the last call."""
+    counts = [len(blocks) for blocks in (bpy.data.scenes, bpy.data.objects, bpy.data.node_groups)]
+    if counts != _counts:
+        _counts[:] = counts
+        unite_looks()
+
+
+def _said_by(scene: bpy.types.Scene, name: str) -> object:
+    """Return what a scene says of the look."""
+    default = PANEL_OPTIONS[name].default
+    return getattr(scene.radiosity, name) if scene.is_property_set("radiosity") else default
+
+
+@contextmanager
+def looks_put_back() -> Iterator[None]:
+    """Put back what is shown, and what each scene says of it, if this fails."""
+    from ..apply.lamp_highlights import highlights_kept
+    from ..material_copies.lightmap_materials import looks_kept
+
+    shown, highlights = looks_kept(), highlights_kept()
+    scenes = [scene for scene in bpy.data.scenes if scene.library is None]
+    settings = {scene: scene.radiosity for scene in scenes if scene.is_property_set("radiosity")}
+    said = {
+        (scene, name): getattr(group, name)
+        for scene, group in settings.items()
+        for name in _LOOK
+        if group.is_property_set(name)
+    }
+    try:
+        yield
+    except BaseException:
+        shown()
+        highlights()
+        with _quietly():
+            for scene in scenes:
+                for name in _LOOK if scene in settings else ():
+                    scene.radiosity.property_unset(name)
+                if scene not in settings:
+                    scene.property_unset("radiosity")
+            for (scene, name), value in said.items():
+                setattr(scene.radiosity, name, value)
+        raise
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Change what scenes say of the look, and not the look."""
+    _quiet.append(True)
+    try:
+        yield
+    finally:
+        _quiet.pop()
 
 
 def read_earlier(_: object = None) -> None:
