@@ -23,6 +23,7 @@ from ..lightmap.lighting import (
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas
+from ..lights import grouped
 from ..numerics import Array, Scratch, give_back, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
@@ -139,7 +140,7 @@ def _bake(
     lighting_seconds = stages.light * len(geometry) / max(sum(plan.texels), 1.0)
     solving, lighting, encoding = rest.expecting([stages.solve, lighting_seconds, stages.encode])
     with timed(seconds, "solve"):
-        solution = solve_scene(bake_scene, quality.solver, solving)
+        solution = solve_scene(bake_scene, quality.solver, solving, apart=keep)
     lighting.stage("light", 0.0, 1.0).at(0.0)
     give_back()
     is_shown = share_out_memory(geometry, settings, keep)
@@ -264,8 +265,13 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 
-def solve_scene(bake_scene: BakeScene, settings: SolverSettings, progress: Progress) -> Solution:
-    """Solve, with a picture of the solution at first, now and then, and at the end."""
+def solve_scene(
+    bake_scene: BakeScene, settings: SolverSettings, progress: Progress, apart: bool = True
+) -> Solution:
+    """Solve, with a picture of the solution at first, now and then, and at the end.
+
+    apart: Whether every lamp's light must be known; else many lamps are grouped.
+    """
     next_picture, last = 0.0, None
 
     def look(state: SolverState | None) -> Picture | None:
@@ -279,7 +285,8 @@ def solve_scene(bake_scene: BakeScene, settings: SolverSettings, progress: Progr
 
     solving = progress.stage("solve", 0.0, 1.0, look)
     solving.at(0.0)
-    solution = solve(bake_scene.scene, settings, solving)
+    scene = bake_scene.scene if apart else bake_scene.scene.with_lights(grouped(bake_scene.scene.lights))
+    solution = solve(scene, settings, solving)
     next_picture = 0.0
     solving.at(1.0, last)
     return solution

@@ -17,6 +17,7 @@ from .environment import (
     pixel_bounds,
     solid_angles,
 )
+from .lamp_group import LampGroup, each_lamp, grouped
 from .light import Emitter, Lamp, Light
 from .point import PointLight, SpotLight
 from .sun_and_sky import EnvironmentLight, SunLight, light_strengths
@@ -29,6 +30,7 @@ __all__ = [
     "EnvironmentImage",
     "EnvironmentLight",
     "Lamp",
+    "LampGroup",
     "Light",
     "PointLight",
     "SkyPatch",
@@ -36,7 +38,9 @@ __all__ = [
     "SpotLight",
     "SunLight",
     "bright_patches",
+    "each_lamp",
     "even_part",
+    "grouped",
     "light_strengths",
     "pixel_bounds",
     "solid_angles",
