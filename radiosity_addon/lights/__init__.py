@@ -18,7 +18,7 @@ from .environment import (
     solid_angles,
 )
 from .lamp_group import LampGroup, each_lamp, grouped
-from .light import Emitter, Lamp, Light
+from .light import Emitter, Lamp, Light, Rays
 from .point import PointLight, SpotLight
 from .sun_and_sky import EnvironmentLight, SunLight, light_strengths
 
@@ -33,6 +33,7 @@ __all__ = [
     "LampGroup",
     "Light",
     "PointLight",
+    "Rays",
     "SkyPatch",
     "SkyTable",
     "SpotLight",

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...lights import Lamp, LampGroup
+from ...lights import Lamp, LampGroup, Rays
 from ...numerics import Array, Stream, fill_chunks, marked, row_numbers, stratified_square, tiles
 from ...rays import RayCaster, passing_light
 from ..emitters import EmitterGroup
@@ -152,10 +152,43 @@ def _shadowed(
 
     Of a tinted caster (r, 3) and (r,), and whether the rays of a row differ, (r,).
     """
-    at, chunk = spread.at, rows[part]
+    chunk = rows[part]
+    center, normal = spread.at.points[chunk], spread.at.normals[chunk]
+    unit = stratified_square(spread.at.keys[chunk], count, seed + Stream.SHADOW_RAYS)
+    aimed = light.shadow_rays(center, normal, unit)
+    start, directions, distances, weights = spread_rays(spread, light, caster, chunk, unit, aimed, seed)
+    point, sample = np.nonzero(weights > 0)
+    ray = (point, sample)
+    free = passing_light(caster, start[ray], directions[ray], distances[ray])
+    if not caster.tinted:
+        return np.bincount(point, free * weights[ray], minlength=len(chunk)), weights.sum(axis=1)
+    lit = [np.bincount(point, of * weights[ray], minlength=len(chunk)) for of in free.T]
+    low, high = np.full((len(chunk), 3), np.inf), np.zeros((len(chunk), 3))
+    np.minimum.at(low, point, free)
+    np.maximum.at(high, point, free)
+    uneven = (high - low > UNEVEN * high).any(axis=1)
+    return np.stack(lit, axis=1), weights.sum(axis=1), uneven
+
+
+def spread_rays(
+    spread: SpreadPoints,
+    light: Lamp | EmitterGroup,
+    caster: RayCaster,
+    chunk: Array,
+    unit: Array,
+    aimed: Rays,
+    seed: int,
+) -> tuple[Array, Array, Array, Array]:
+    """Spread rays that are aimed at a light from the centers of footprints over the footprints.
+
+    chunk (r,): Rows of the footprints.
+    unit (r, k, 2): What aimed the rays.
+    aimed: Directions, distances and weights.
+    Returns starts, directions (r, k, 3), distances, weights (r, k).
+    """
+    at, count = spread.at, unit.shape[1]
     center, normal = at.points[chunk], at.normals[chunk]
-    unit = stratified_square(at.keys[chunk], count, seed + Stream.SHADOW_RAYS)
-    directions, distances, weights = light.shadow_rays(center, normal, unit)
+    directions, distances, weights = aimed
     # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
     weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
     start = center[:, None]
@@ -182,17 +215,7 @@ def _shadowed(
     if at.lift is not None:
         start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
     start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
-    point, sample = np.nonzero(weights > 0)
-    ray = (point, sample)
-    free = passing_light(caster, start[ray], directions[ray], distances[ray])
-    if not caster.tinted:
-        return np.bincount(point, free * weights[ray], minlength=len(chunk)), weights.sum(axis=1)
-    lit = [np.bincount(point, of * weights[ray], minlength=len(chunk)) for of in free.T]
-    low, high = np.full((len(chunk), 3), np.inf), np.zeros((len(chunk), 3))
-    np.minimum.at(low, point, free)
-    np.maximum.at(high, point, free)
-    uneven = (high - low > UNEVEN * high).any(axis=1)
-    return np.stack(lit, axis=1), weights.sum(axis=1), uneven
+    return start, directions, distances, weights
 
 
 def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
