@@ -28,8 +28,55 @@ BY_POWER = 0.1
 BELOW_ONE = 1.0 - 2.0**-24
 """The largest number that places a sample."""
 
+LEAST_DOUBT = 0.05
+"""Standard deviation of what a point sees of a lamp, at least, however sure its surroundings are."""
+
 BLOCK_PAIRS = 1 << 16
 """Pairs of point and lamp evaluated at a time: their temporaries stay in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class LearnedRays:
+    """k rays of each of n points, that measure by how much what is known of lamps is wrong.
+
+    The irradiance is `base` + Σ weight (free − known); were nothing in the way, it would be `far` + Σ weight
+    over near rays.
+
+    rays: As of `Lamp.shadow_rays`.
+    known (n, k): How much of its lamp the point is taken to see; 0 of near ones, which nothing is known of.
+    near (n, k): Whether its lamp is near.
+    base (n,): The irradiance by what is known, per unit of strength.
+    far (n,): The unoccluded irradiance of all that is not near.
+    """
+
+    rays: Rays
+    known: Float64Array
+    near: npt.NDArray[np.bool_]
+    base: Float64Array
+    far: Float64Array
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """(n, k) lamps in the table's order, the chances of their choice, and what is left of the numbers.
+
+    known, near, base, far: As in `LearnedRays`; 0 if nothing has been learned.
+    """
+
+    lamp: npt.NDArray[np.int64]
+    chance: Float64Array
+    within: Float64Array
+    known: Float64Array
+    near: npt.NDArray[np.bool_]
+    base: Float64Array
+    far: Float64Array
+
+    @staticmethod
+    def empty(count: int, each: int) -> _Choice:
+        chance, within, known = np.zeros((3, count, each))
+        base, far = np.zeros((2, count))
+        lamp = np.zeros((count, each), dtype=np.int64)
+        return _Choice(lamp, chance, within, known, np.zeros((count, each), dtype=bool), base, far)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,44 +155,94 @@ class LampGroup(Emitter):
         middle = starts.mean(axis=1)
         return self._rays_from(starts, self._choose(middle, normals, u[..., 0], BY_POWER), normals, u)
 
-    def _choose(
-        self, points: Float64Array, normals: Float64Array, u: Samples, by_power: float
-    ) -> tuple[npt.NDArray[np.int64], Float64Array, Float64Array]:
-        """Choose lamps for points by (n, k) numbers: `by_power` of them by power alone.
+    def learned_rays(
+        self, points: Float64Array, normals: Float64Array, u: Samples, seen: Float64Array
+    ) -> LearnedRays:
+        """Return rays to lamps by what is not known of them yet.
 
-        Returns lamp, the probability of the choice, and what is left of the number, (n, k) each.
+        seen (n, c): About how much points see of each run of lamps, see `column_of`.
+        """
+        choice = self._choose(points, normals, u[..., 0], 0.0, seen)
+        starts = np.broadcast_to(points[:, None], (*u.shape[:2], 3))
+        return LearnedRays(
+            self._rays_from(starts, choice, normals, u), choice.known, choice.near, choice.base, choice.far
+        )
+
+    def doubt(self, points: Float64Array, normals: Float64Array, seen: Float64Array) -> Float64Array:
+        """Return (n,) the standard deviation of the share that is seen, by one ray of `learned_rays`.
+
+        seen (n, c): As there.
         """
         table, shares = self._sorted
-        lamp, (chance, within) = np.empty(u.shape, dtype=np.int64), np.empty((2, *u.shape))
+        column = self.column_of(seen.shape[1])
+        doubt = np.empty(len(points))
         for rows in self._blocks(len(points)):
-            each = table.afar(points[rows], normals[rows])[0] * shares
+            each, near = table.afar(points[rows], normals[rows])
+            each = each * shares
+            total = each.sum(axis=1)
+            each *= _doubts(seen[rows][:, column], near)
+            doubt[rows] = each.sum(axis=1) / np.where(total > 0.0, total, 1.0)
+        return doubt
+
+    def chosen_rays(
+        self, points: Float64Array, normals: Float64Array, u: Samples
+    ) -> tuple[Rays, npt.NDArray[np.int64]]:
+        """Return the rays of `shadow_rays`, and to which lamp each goes, (n, k) in the table's order."""
+        starts = np.broadcast_to(points[:, None], (*u.shape[:2], 3))
+        choice = self._choose(points, normals, u[..., 0], 0.0)
+        return self._rays_from(starts, choice, normals, u), choice.lamp
+
+    def column_of(self, columns: int) -> npt.NDArray[np.int64]:
+        """Return (m,) which of so many runs of neighbors the lamps of the table's order are in."""
+        return np.arange(len(self.members)) * columns // len(self.members)
+
+    def _choose(
+        self,
+        points: Float64Array,
+        normals: Float64Array,
+        u: Samples,
+        by_power: float,
+        seen: Float64Array | None = None,
+    ) -> _Choice:
+        """Choose lamps for points by (n, k) numbers: `by_power` of them by power alone.
+
+        seen (n, c): As for `learned_rays`: then in proportion to how uncertain that leaves what they add.
+        """
+        table, shares = self._sorted
+        column = None if seen is None else self.column_of(seen.shape[1])
+        choice = _Choice.empty(*u.shape)
+        for rows in self._blocks(len(points)):
+            each, near = table.afar(points[rows], normals[rows])
+            each = each * shares
+            known = None
+            if seen is not None:
+                known = seen[rows][:, column]
+                known[near] = 0.0
+                choice.base[rows] = (each * known).sum(axis=1)
+                choice.far[rows] = np.where(near, 0.0, each).sum(axis=1)
+                each *= _doubts(known, near)
             total = each.sum(axis=1, keepdims=True)
             each *= (1.0 - by_power) / np.where(total > 0.0, total, 1.0)
             each += np.where(total > 0.0, by_power, 1.0) * shares
             first = len(table) * np.arange(len(each))[:, None]
-            entry, within[rows] = pick_in_runs(running_sums(each.ravel()), u[rows], first, first + len(table))
-            lamp[rows], chance[rows] = entry - first, each.ravel()[entry]
-        return lamp, chance, within
+            entry, choice.within[rows] = pick_in_runs(
+                running_sums(each.ravel()), u[rows], first, first + len(table)
+            )
+            choice.lamp[rows], choice.chance[rows] = entry - first, each.ravel()[entry]
+            if known is not None:
+                choice.known[rows], choice.near[rows] = known.ravel()[entry], near.ravel()[entry]
+        return choice
 
-    def _rays_from(
-        self,
-        starts: Float64Array,
-        choice: tuple[npt.NDArray[np.int64], Float64Array, Float64Array],
-        normals: Float64Array,
-        u: Samples,
-    ) -> Rays:
+    def _rays_from(self, starts: Float64Array, choice: _Choice, normals: Float64Array, u: Samples) -> Rays:
         """Return a ray from each of (n, k, 3) points to the lamp chosen for it."""
         table, shares = self._sorted
-        (lamp, chance, within), count = choice, u.shape[1]
-        square = np.minimum(np.stack([within, u[..., 1]], axis=-1), BELOW_ONE)
+        count = u.shape[1]
+        square = np.minimum(np.stack([choice.within, u[..., 1]], axis=-1), BELOW_ONE)
         facing = np.repeat(normals, count, axis=0)
-        found = table.rays(lamp.ravel(), starts.reshape(-1, 3), facing, square.reshape(-1, 2))
+        found = table.rays(choice.lamp.ravel(), starts.reshape(-1, 3), facing, square.reshape(-1, 2))
         directions, distances, weights = (each.reshape(*u.shape[:2], *each.shape[1:]) for each in found)
-        return (
-            directions,
-            distances,
-            weights * shares[lamp] / (np.where(chance > 0.0, chance, np.inf) * count),
-        )
+        chance = np.where(choice.chance > 0.0, choice.chance, np.inf)
+        return directions, distances, weights * shares[choice.lamp] / (chance * count)
 
     def emit(self, place: Samples, way: Samples) -> Rays:
         """Return rays that carry the lamps' light away, as many of each as its part (see `Emitter.emit`)."""
@@ -163,6 +260,12 @@ class LampGroup(Emitter):
     def _blocks(self, count: int) -> list[slice]:
         step = max(BLOCK_PAIRS // len(self.members), 1)
         return [slice(first, first + step) for first in range(0, count, step)]
+
+
+def _doubts(known: Float64Array, near: npt.NDArray[np.bool_]) -> Float64Array:
+    """Return (n, m) the standard deviations of what points see of lamps, of which they know the mean."""
+    deviation = np.sqrt(np.maximum(known * (1.0 - known), LEAST_DOUBT**2))
+    return np.asarray(np.where(near, 0.5, deviation))
 
 
 def each_lamp(lights: Sequence[Light]) -> list[Light]:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..form_factors import ray_geometry_term, throughput
-from ..numerics import concentric_disk, intensity_of_flux, radiance_of_flux, run_starts
+from ..numerics import along_curve, concentric_disk, intensity_of_flux, radiance_of_flux, run_starts
 from .area import AreaLight
 from .light import Emitter, Float64Array, Rays, Samples, directions_to, row_cosines
 from .point import PointLight, SpotLight, disk_rays, smoothstep
@@ -36,9 +36,6 @@ TINY = np.float32(1e-30)
 BEAM_SLACK = 1e-6
 """Cosines of single precision are right to this."""
 
-MORTON_BITS = 10
-"""Bits a coordinate by which lamps are sorted: neighbors in space are neighbors in the table."""
-
 
 class LampTable:
     """m lamps: bulbs first, then flat lamps, then all others; each kind along a curve that fills space.
@@ -49,7 +46,7 @@ class LampTable:
     def __init__(self, lamps: Sequence[Emitter]) -> None:
         kind = np.array([_kind(lamp) for lamp in lamps])
         places = np.array([_place(lamp) for lamp in lamps], dtype=np.float64).reshape(-1, 3)
-        self.order: IntArray = np.lexsort((_along_curve(places), kind))
+        self.order: IntArray = np.lexsort((along_curve(places), kind))
         self.members = tuple(lamps[number] for number in self.order)
         self.bulbs, self.ends = int((kind == 0).sum()), int((kind <= 1).sum())
         self.places: Float64Array = places[self.order]
@@ -242,18 +239,6 @@ def _kind(lamp: Emitter) -> int:
 
 def _place(lamp: Emitter) -> npt.ArrayLike:
     return np.asarray(getattr(lamp, "position", (0.0, 0.0, 0.0)))
-
-
-def _along_curve(places: Float64Array) -> IntArray:
-    """Return (m,) int64 where places (m, 3) lie along a Z-order curve through their box."""
-    low = places.min(axis=0, initial=np.inf)
-    width = max(float((places - low).max(initial=0.0)), np.finfo(float).tiny)
-    cell = ((places - low) / width * ((1 << MORTON_BITS) - 1)).astype(np.int64)
-    code = np.zeros(len(places), dtype=np.int64)
-    for bit in range(MORTON_BITS):
-        for axis in range(3):
-            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return code
 
 
 def _each_lamp(lamp: IntArray) -> Iterator[tuple[int, IntArray]]:

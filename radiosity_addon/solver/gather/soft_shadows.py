@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...lights import Lamp, LampGroup, Rays
+from ...lights import Lamp, Rays
 from ...numerics import Array, Stream, fill_chunks, marked, row_numbers, stratified_square, tiles
 from ...rays import RayCaster, passing_light
 from ..emitters import EmitterGroup
@@ -31,10 +31,6 @@ MIN_SHADOW_RAYS = 2
 """Shadow rays of a lamp that adds hardly anything. A single one would measure the visible share of the lamp,
 not of its light: 0.40 instead of 0.44 behind a plate half way to a near lamp; two measure 0.43."""
 
-GROUP_RAYS = 4
-"""Times as many first rays to many lamps together: each sees another one, and what few happen to see alike
-says little of the rest."""
-
 UNEVEN = 0.02
 """Rays behind glass disagree if some bring less than the others by more than this part of any channel."""
 
@@ -50,6 +46,9 @@ class ShadowShare:
 
     spread: The footprints.
     """
+
+    FIRST = 1
+    """Times as many rays a point at first."""
 
     def __init__(
         self,
@@ -80,18 +79,15 @@ class ShadowShare:
         count, near, strength = len(gain), self._at.near, self._light.strength.mean()
         facing = marked(count, lambda tile: gain[tile] > 0)
         few, many = np.empty((2, count), dtype=np.int32)
-        grouped = isinstance(self._light, LampGroup)
-        least = GROUP_RAYS * rays if grouped else rays
+        least = self.FIRST * rays
         for tile in tiles(count):
             part = self._at.weight_of(gain[tile] * strength, tile)
-            few[tile] = _power_of_two(least * np.sqrt(part / MAIN_PART), least)
-            many[tile] = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
+            few[tile] = power_of_two(least * np.sqrt(part / MAIN_PART), least)
+            many[tile] = power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
         self._shadow(row_numbers(facing), few, progress.part(0.0, 0.5))
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
+        many = self._many(facing, many, MORE_RAYS * rays)
         open_rows = facing & (many > few)
-        if grouped and near is None:
-            # More rays only where the first disagree would take the others at their word.
-            open_rows[:] = False
         partial = marked(count, lambda tile: facing[tile] & self._is_partial(tile))
         if near is not None:
             bright = marked(count, lambda tile: facing[tile] & (_mean(self._share(tile)) > 0.5))
@@ -110,6 +106,10 @@ class ShadowShare:
         for tile in tiles(count):
             self._lit[tile] = self._share(tile)
         return self._lit
+
+    def _many(self, _facing: Array, many: Array, _most: int) -> Array:
+        """Return (n,) how many rays follow the first where they disagree: `many`, of which `most` at most."""
+        return many
 
     def _share(self, rows: Array | slice = slice(None)) -> Array:
         total = self._total[rows]
@@ -238,7 +238,7 @@ def _mean(share: Array) -> Array:
     return share if share.ndim == 1 else np.asarray(share.mean(axis=1))
 
 
-def _power_of_two(wanted: Array, most: int) -> Array:
+def power_of_two(wanted: Array, most: int) -> Array:
     """Return (n,) int64 powers of two, at least `wanted`, from `MIN_SHADOW_RAYS` up to `most` itself."""
     exponent = np.ceil(np.log2(np.maximum(wanted, MIN_SHADOW_RAYS)))
     return np.asarray(np.minimum(2.0**exponent, most), dtype=np.int64)
