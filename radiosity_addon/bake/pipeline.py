@@ -77,6 +77,10 @@ MOST_SHOWN = 1 << 22
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
 
+LAMPS_PER_RAY = 16
+"""More lamps than so many for each shadow ray of one are grouped, unless their lights are kept apart: one by
+one each asks two rays at least, together they ask 64 times as many as one where most of them disagree."""
+
 PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
 
@@ -285,7 +289,9 @@ def solve_scene(
 
     solving = progress.stage("solve", 0.0, 1.0, look)
     solving.at(0.0)
-    scene = bake_scene.scene if apart else bake_scene.scene.with_lights(grouped(bake_scene.scene.lights))
+    scene = bake_scene.scene
+    if not apart:
+        scene = scene.with_lights(grouped(scene.lights, most=LAMPS_PER_RAY * settings.shadow_rays))
     solution = solve(scene, settings, solving)
     next_picture = 0.0
     solving.at(1.0, last)

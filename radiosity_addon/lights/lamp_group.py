@@ -13,9 +13,6 @@ from ..numerics import pick_in_runs, running_sums
 from .lamp_table import LampTable
 from .light import Emitter, Float64Array, Light, Rays, Samples
 
-MANY_LAMPS = 32
-"""Up to so many lamps are evaluated one by one."""
-
 MOST_COLORS = 3
 """Lamps of more colors than these are grouped by channel instead: three groups hold any color."""
 
@@ -273,13 +270,13 @@ def each_lamp(lights: Sequence[Light]) -> list[Light]:
     return [one for light in lights for one in (light.members if isinstance(light, LampGroup) else [light])]
 
 
-def grouped(lights: Sequence[Light]) -> tuple[Light, ...]:
-    """Return lights of which more than `MANY_LAMPS` lamps with a place are groups of one color each.
+def grouped(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
+    """Return lights of which lamps with a place, if they are more than `most`, are groups of one color each.
 
     Their light is the same; what it costs hardly grows with their number.
     """
     lit = [light for light in lights if isinstance(light, Emitter) and light.strength.any()]
-    if len(lit) <= MANY_LAMPS:
+    if len(lit) <= most:
         return tuple(lights)
     chosen = {id(light) for light in lit}
     result = [light for light in lights if id(light) not in chosen]
