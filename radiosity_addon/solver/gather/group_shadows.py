@@ -86,9 +86,11 @@ class GroupShadowShare(ShadowShare):
         self._taught = True
 
     def _shadow_alike(self, rows: Array, count: int, progress: Progress) -> None:
-        scene = (self._spread, self._group, self._caster, rows, count, self._seed)
         learned = self._learned if self._taught else None
-        trace = partial(_first_rays, *scene) if learned is None else partial(_learned_rays, *scene, learned)
+        trace = partial(_first_rays, self._spread, self._group, self._caster, rows, count, self._seed)
+        if learned is not None:
+            scene = self._spread, self._group, self._caster
+            trace = partial(_learned_rays, *scene, rows, count, self._seed, learned)
         chunk = max(CHUNK_RAYS // count, 1)
         # In order: what is learned is a sum.
         for part, found in map_chunks(trace, len(rows), chunk, self._threads, progress):
