@@ -33,6 +33,7 @@ from ..solver.element_transport import Relightable
 from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
 from .estimate import estimate_of, refuse_before_unwrapping
 from .layout import lay_out, padding
+from .levels import with_levels
 from .quality import for_error, quality_of, used_settings
 from .relight import (
     HierarchyReport,
@@ -229,9 +230,12 @@ def finish(
         for item, placed in zip(baked, atlas.objects, strict=True)
     )
     light, details = more
+    shown = with_levels(bake_scene, objects)
+    if light:
+        light = (*light, *({},) * (len(shown) - len(objects)))
     result = BakeResult(
         pages,
-        objects,
+        shown,
         solver=report,
         warnings=warnings,
         seconds=seconds,

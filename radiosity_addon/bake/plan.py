@@ -8,6 +8,7 @@ on them are not renewed.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
@@ -53,6 +54,28 @@ class ShownBake(NamedTuple):
     lightmaps: Mapping[str, RememberedLightmap]
     objects: Mapping[str, str]
 
+    def gone(self, digests: BakeDigests) -> list[str]:
+        """Return the objects that the last bake had and the scene has not, except for renamed ones."""
+        present = {digest[:SHORT] for digest in digests.objects.values()}
+        return [
+            name for name in self.objects if name not in digests.objects and self.objects[name] not in present
+        ]
+
+    def altered(self, digests: BakeDigests) -> list[str]:
+        """Return the objects that are not as in the last bake, except for renamed ones."""
+        before = set(self.objects.values())
+        return [name for name, digest in digests.objects.items() if before and digest[:SHORT] not in before]
+
+    def described(self, digests: BakeDigests) -> str:
+        """Return in words which objects of the last bake have changed or are gone; "" for none."""
+        changed = {name for name in self.altered(digests) if name in self.objects}
+        changed |= {
+            name
+            for name, lightmap in self.lightmaps.items()
+            if name in digests.objects and lightmap.digest != digests.objects[name]
+        }
+        return _described(self.gone(digests), [name for name in digests.objects if name in changed])
+
 
 class BakeDigests(NamedTuple):
     """What is to be remembered of a bake: the digest of the light, and of each object."""
@@ -64,6 +87,10 @@ class BakeDigests(NamedTuple):
     def of(cls, bake_scene: BakeScene, settings: BakeSettings) -> BakeDigests:
         """Return the digests of a scene."""
         objects = {item.name: rounded_digest(bake_scene, item) for item in bake_scene.objects}
+        for item in bake_scene.objects:
+            if item.level is not None and item.level.base in objects:  # shows its lightmap
+                both = objects[item.level.base] + objects[item.name]
+                objects[item.level.base] = hashlib.sha256(both.encode()).hexdigest()
         return cls(light_digest(bake_scene, settings), objects)
 
     def as_before(self, shown: ShownBake, names: Collection[str]) -> BakeDigests:
@@ -117,12 +144,8 @@ class BakePlan:
     @property
     def _ignored(self) -> str:
         """What else differs from the last bake, "" for nothing."""
-        parts = []
-        for what, names in (("removed", self.gone), ("changed", self.altered)):
-            named = ", ".join(f"'{name}'" for name in names[:_NAMED])
-            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-            parts += [f"{what} since the last bake: {named}{more}"] if names else []
-        return f"{'; '.join(parts)}; their light and shadow stay until you bake all" if parts else ""
+        described = _described(self.gone, self.altered)
+        return f"{described}; their light and shadow stay until you bake all" if described else ""
 
 
 def plan_bake(
@@ -147,7 +170,8 @@ def plan_bake(
     }
     if not same or any(lightmap.has_groups for lightmap in same.values()):
         return full
-    gone, altered = _gone(shown, digests), _altered(shown, digests, baked)
+    gone = shown.gone(digests)
+    altered = [name for name in shown.altered(digests) if name not in baked]
     if len(same) == len(baked):
         return BakePlan("nothing", bake_scene, settings, digests, None, same.keys(), gone, altered)
     objects = tuple(replace(item, bake=item.bake and item.name not in same) for item in bake_scene.objects)
@@ -198,19 +222,10 @@ def _opened(kept: KeptBake, bake_scene: BakeScene) -> list[str]:
     return [item.name for item in bake_scene.objects if opened[item.rows].any()]
 
 
-def _gone(shown: ShownBake, digests: BakeDigests) -> list[str]:
-    """Return the objects that the last bake had and the scene has not, except for renamed ones."""
-    present = {digest[:SHORT] for digest in digests.objects.values()}
-    return [
-        name for name in shown.objects if name not in digests.objects and shown.objects[name] not in present
-    ]
-
-
-def _altered(shown: ShownBake, digests: BakeDigests, baked: Collection[str]) -> list[str]:
-    """Return the objects without a lightmap that are not as in the last bake, except for renamed ones."""
-    before = set(shown.objects.values())
-    return [
-        name
-        for name, digest in digests.objects.items()
-        if before and name not in baked and digest[:SHORT] not in before
-    ]
+def _described(gone: Sequence[str], altered: Sequence[str]) -> str:
+    parts = []
+    for what, names in (("removed", gone), ("changed", altered)):
+        named = ", ".join(f"'{name}'" for name in names[:_NAMED])
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        parts += [f"{what} since the last bake: {named}{more}"] if names else []
+    return "; ".join(parts)

@@ -13,6 +13,7 @@ from .ktx2 import read_ktx2, write_ktx2
 from .lit_gltf import LIGHTMAP_CHANNEL, ExportedNames, emissive_only, with_lightmaps
 from .pages import resampled
 from .png8 import png_of_linear, srgb_of_linear
+from .rgbm import decode_rgbm, encode_rgbm, write_rgbm
 from .shared_exponent import decode_rgb9e5, encode_rgb9e5
 from .shared_meshes import LightmapPlace, share_meshes
 from .web_page import viewer_page
@@ -29,8 +30,10 @@ __all__ = [
     "NodeEntry",
     "PageEntry",
     "decode_rgb9e5",
+    "decode_rgbm",
     "emissive_only",
     "encode_rgb9e5",
+    "encode_rgbm",
     "lightmap_index",
     "png_of_linear",
     "read_half_exr",
@@ -43,4 +46,5 @@ __all__ = [
     "with_lightmaps",
     "write_half_exr",
     "write_ktx2",
+    "write_rgbm",
 ]

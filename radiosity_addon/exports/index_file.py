@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 INDEX_NAME = "lightmaps.json"
 INDEX_VERSION = 1
@@ -16,12 +17,17 @@ UNIT = "W/m²/sr"
 
 @dataclass(frozen=True)
 class PageEntry:
-    """One lightmap in its encodings: files of the same image."""
+    """One lightmap in its encodings: files of the same image.
+
+    rgbm, rgbm_range: Only if that was exported.
+    """
 
     width: int
     height: int
     exr: str
     ktx2: str
+    rgbm: str | None = None
+    rgbm_range: float | None = None
 
 
 @dataclass(frozen=True)
@@ -67,5 +73,12 @@ def lightmap_index(index: LightmapIndex) -> str:
         "exr": "OpenEXR, half float, linear Rec. 709, the quantity itself",
         "ktx2": "KTX2, E5B9G9R9_UFLOAT_PACK32, linear Rec. 709, the quantity itself; rows from the top",
     }
+    if any(page.rgbm for page in index.pages):
+        encodings["rgbm"] = "PNG, linear Rec. 709: the quantity = rgbm_range · alpha · color, each of 0 to 1"
     head = {"version": INDEX_VERSION, "quantity": QUANTITY, "unit": UNIT, "encodings": encodings}
-    return json.dumps({**head, **asdict(index)}, indent=1, ensure_ascii=False) + "\n"
+    content = asdict(index, dict_factory=_without_none)
+    return json.dumps({**head, **content}, indent=1, ensure_ascii=False) + "\n"
+
+
+def _without_none(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {key: value for key, value in items if value is not None}

@@ -1,4 +1,4 @@
-"""PNG images of 8 bits, encoded in sRGB: what the glTF standard has for colors.
+"""PNG images of 8 bits; encoded in sRGB they are what the glTF standard has for colors.
 
 After "Portable Network Graphics" (W3C), with its filter Paeth's simpler cousin Up: rows are differences from
 the row above.
@@ -26,6 +26,11 @@ def png_of_linear(colors: Array, alpha: Array | None = None) -> bytes:
     if alpha is not None:
         covered = np.rint(255.0 * np.clip(alpha, 0.0, 1.0)).astype(np.uint8)
         encoded = np.concatenate([encoded, covered[..., None]], axis=-1)
+    return png_of_bytes(encoded)
+
+
+def png_of_bytes(encoded: Array) -> bytes:
+    """Return the file of an image (height, width, 3 or 4) uint8, row 0 at the bottom."""
     height, width, channels = encoded.shape
     rows = np.ascontiguousarray(encoded[::-1]).reshape(height, width * channels)
     filtered = np.empty((height, 1 + width * channels), dtype=np.uint8)

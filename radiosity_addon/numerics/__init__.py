@@ -11,6 +11,7 @@ from .curve import along_curve
 from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .heap import give_back
 from .meshes import connected_components, connected_faces, numbered, weld
+from .nearest_triangles import TriangleTree, closest_weights
 from .parallel import fill_chunks, map_chunks, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
 from .radiometry import (
@@ -71,10 +72,12 @@ __all__ = [
     "Rows",
     "Scratch",
     "Stream",
+    "TriangleTree",
     "along_curve",
     "areas",
     "brdf_of_reflectance",
     "clip_half_plane",
+    "closest_weights",
     "concentric_disk",
     "cone_projected_solid_angle",
     "cone_solid_angle",

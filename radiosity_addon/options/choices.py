@@ -100,6 +100,7 @@ EXPORT_FORMS = (
     Choice("godot", "Godot", "scene.glb, OpenEXR lightmaps and an importer script for Godot 4"),
     Choice("unity", "Unity", "scene.glb, OpenEXR lightmaps and scripts for Unity"),
     Choice("bevy", "Bevy", "scene.glb, lightmaps and a module for Bevy"),
+    Choice("rgbm", "RGBM", "scene.glb, and lightmaps also as PNG images for engines that read no HDR images"),
 )
 
 METHOD_CHOICES = tuple(Choice(name, method.label, method.description) for name, method in METHODS.items())

@@ -40,6 +40,11 @@ class Form:
         return "web" in self.names
 
     @property
+    def rgbm(self) -> bool:
+        """Whether lightmaps are written as PNG images, too."""
+        return "rgbm" in self.names
+
+    @property
     def engines(self) -> tuple[str, ...]:
         """The engines among the forms."""
         return tuple(name for name in ENGINES if name in self.names)

@@ -93,6 +93,7 @@ class _PanelSettings:
     export_godot: bool = _form("godot")
     export_unity: bool = _form("unity")
     export_bevy: bool = _form("bevy")
+    export_rgbm: bool = _form("rgbm")
     sum_groups: bool = option(False, SUM_GROUPS, EXPORT, panel=PanelRow("Sum Light Groups"))
 
 

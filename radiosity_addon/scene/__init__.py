@@ -5,7 +5,7 @@ Also which of several surfaces in one place counts, and rays that pass through c
 
 from __future__ import annotations
 
-from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene
+from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene, LevelOfDetail
 from .closed_solids import sealed_backs
 from .coincident_faces import coincident_triangles
 from .faces import Faces
@@ -24,6 +24,7 @@ __all__ = [
     "BakeScene",
     "Faces",
     "Glow",
+    "LevelOfDetail",
     "Scene",
     "SurfaceImages",
     "arriving",

@@ -17,6 +17,23 @@ from .scene import Scene
 LIGHTMAP_UV_LAYER = "Lightmap"
 
 
+@dataclass(frozen=True, eq=False)
+class LevelOfDetail:
+    """The mesh of an object that shows the lightmap of another one, of which it is a coarser version.
+
+    base: The name of the other object.
+    triangles (t, 3, 3): In the world.
+    to_base (4, 4): Carries them to where they are if both objects have one place.
+    polygon (t,), loops (t, 3): As those of `BakeObject`.
+    """
+
+    base: str
+    triangles: Array
+    to_base: Array
+    polygon: Array
+    loops: Array
+
+
 @dataclass(frozen=True)
 class BakeObject:
     """A run of consecutive triangles of the scene that came from one object.
@@ -31,6 +48,7 @@ class BakeObject:
     thinning: A further factor, if a bake of part of a scene is to be like one of all of it.
     glass (count,) bool: Triangles that are glass, which get no texels; None for none.
     page: The shared page that it is to be on, from 1; 0 for any.
+    level: Of a coarser level of detail, which has no triangles in the scene; None of all others.
     """
 
     name: str
@@ -44,6 +62,7 @@ class BakeObject:
     thinning: float = 1.0
     glass: Array | None = None
     page: int = 0
+    level: LevelOfDetail | None = None
 
     @property
     def rows(self) -> slice:
@@ -78,3 +97,9 @@ class BakeScene:
     light_groups: tuple[str, ...] = ()
     emitter_groups: tuple[str, ...] = ()
     cameras: tuple[tuple[float, float, float], ...] = ()
+
+    @property
+    def levels(self) -> list[BakeObject]:
+        """Coarser levels of detail of the objects that get a lightmap here."""
+        baked = {item.name for item in self.objects if item.bake}
+        return [item for item in self.objects if item.level is not None and item.level.base in baked]

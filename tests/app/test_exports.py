@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
-from radiosity_addon.exports import Glb, read_half_exr, read_ktx2
+from radiosity_addon.exports import Glb, decode_rgbm, read_half_exr, read_ktx2
 from radiosity_addon.files import is_outdated, lightmap_digests
 
 from .conftest import QUICK, Baked, read_pixels, read_report, save
@@ -43,6 +43,7 @@ def test_each_form_makes_its_files(run: Run, folder: Path) -> None:
         ("glb", GLB),
         ("web", GLB | {"viewer.html", "three-lightmap.js"}),
         ("godot,unity,bevy", BASE | scripts),
+        ("rgbm", BASE | {"lightmap_rgbm.png"}),
     ):
         shutil.rmtree(folder / "export", ignore_errors=True)
         done = run("export", folder, "--forms", forms)
@@ -59,6 +60,27 @@ def test_the_lightmap_is_that_of_the_bake(run: Run, folder: Path) -> None:
     np.testing.assert_allclose(exr, exact, rtol=2**-11, atol=2**-25)
     ktx2 = read_ktx2((folder / "export" / "lightmap.ktx2").read_bytes())
     assert (np.abs(ktx2 - exact).max(axis=-1) <= exact.max(axis=-1) / 512 + 1e-12).all()
+
+
+def test_rgbm_is_the_lightmap_too(run: Run, folder: Path) -> None:
+    assert run("export", folder, "--forms", "rgbm", "--quiet").code == 0
+    index = json.loads((folder / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    (page,) = index["pages"]
+    assert page["rgbm"] == "lightmap_rgbm.png"
+    assert "rgbm_range" in index["encodings"]["rgbm"]
+    image = bpy.data.images.load(str(folder / "export" / page["rgbm"]))
+    image.colorspace_settings.name, image.alpha_mode = "Non-Color", "CHANNEL_PACKED"
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    encoded = np.rint(255.0 * pixels).reshape(page["height"], page["width"], 4)
+    found = decode_rgbm(encoded, page["rgbm_range"])
+    exact = read_pixels(folder / "lightmap.exr")[..., :3]
+    brightest = np.maximum(exact.max(axis=-1), page["rgbm_range"] / 255)
+    assert (np.abs(found - exact).max(axis=-1) <= brightest / 255 * 1.0001).all()
+
+    assert run("export", folder, "--forms", "glb", "--quiet").code == 0
+    index = json.loads((folder / "export" / "lightmaps.json").read_text(encoding="utf-8"))
+    assert "rgbm" not in json.dumps(index)
 
 
 def test_the_same_bake_gives_the_same_export(run: Run, folder: Path) -> None:
@@ -105,14 +127,16 @@ def test_what_another_form_leaves_of_earlier_lightmaps_is_named(run: Run, room: 
     out = tmp_path / "out"
     assert run("bake", room, "--output", out, *QUICK, "--export", "web").code == 0
     assert "earlier" not in run("export", out, "--forms", "godot").out
-    assert run("bake", room, "--output", out, *QUICK, "--seed", "1", "--export", "web", "--quiet").code == 0
+    assert (
+        run("bake", room, "--output", out, *QUICK, "--seed", "1", "--export", "web,rgbm", "--quiet").code == 0
+    )
     done = run("bake", room, "--output", out, *QUICK, "--padding", "4", "--export", "godot")
-    for name in ("scene_baked.glb", "viewer.html"):
+    for name in ("scene_baked.glb", "viewer.html", "lightmap_rgbm.png"):
         assert f"note: {name} is of earlier lightmaps" in done.out
     done = run("export", out, "--forms", "godot")
     assert "note: viewer.html is of earlier lightmaps" in done.out
     assert is_outdated_export(out)
-    done = run("export", out, "--forms", "web")
+    done = run("export", out, "--forms", "web,rgbm")
     assert "earlier" not in done.out
     assert not is_outdated_export(out)
 
@@ -266,3 +290,37 @@ def test_the_binary_files_have_the_lengths_they_say(run: Run, folder: Path) -> N
     for name in ("scene.glb", "scene_baked.glb"):
         data = (folder / "export" / name).read_bytes()
         assert struct.unpack_from("<4sII", data) == (b"glTF", 2, len(data))
+
+
+def test_what_was_edited_since_the_bake_is_named(run: Run, folder: Path) -> None:
+    def said() -> list[str]:
+        done = run("export", folder, "--forms", "glb")
+        assert done.code == 0
+        return [line for line in done.out.splitlines() if line.startswith("note: ")]
+
+    assert not [note for note in said() if "since" in note]
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "baked.blend"))
+    bpy.context.scene["mine"] = 1  # nothing that light depends on
+    save(folder / "baked.blend")
+    assert [note for note in said() if "since" in note] == [
+        "note: baked.blend was changed since it was baked: it is exported as it is"
+    ]
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "baked.blend"))
+    bpy.data.objects["Cube"].location.x += 0.5
+    tree = bpy.data.materials["Red"].node_tree
+    shader = next(node for node in tree.nodes if node.type.startswith("BSDF"))
+    shader.inputs[0].default_value = (0.1, 0.2, 0.8, 1.0)
+    bpy.data.meshes["Floor"].vertices[0].co.z += 0.3
+    save(folder / "baked.blend")
+    (note,) = [note for note in said() if "since the last bake" in note]
+    assert note == (
+        "note: changed since the last bake: 'Floor', 'Wall', 'Cube'; "
+        "the lightmaps show their light of before: bake again"
+    )
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "baked.blend"))
+    bpy.data.objects.remove(bpy.data.objects["Wall"])
+    save(folder / "baked.blend")
+    (note,) = [note for note in said() if "since the last bake" in note]
+    assert note.startswith(
+        "note: removed since the last bake: 'Wall'; changed since the last bake: 'Floor', 'Cube'; "
+    )

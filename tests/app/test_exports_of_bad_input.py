@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import bpy
@@ -16,7 +17,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.command_line.outdated_exports import warn_of_outdated
-from radiosity_addon.blender.exporting import export
+from radiosity_addon.blender.exporting import export, exported_lightmaps
 from radiosity_addon.blender.exporting.export_scene import PREFIX, TEMPORARY
 from radiosity_addon.cli import Console
 from radiosity_addon.exports import Glb, read_half_exr
@@ -205,9 +206,12 @@ def test_an_image_that_is_missing_is_named_and_its_default_exported_as_baked(
     assert "baseColorTexture" not in exported["pbrMetallicRoughness"]
 
 
-@pytest.mark.parametrize("step", ["write_ktx2", "emissive_only", "viewer_page"])
+@pytest.mark.parametrize(
+    ("module", "step"),
+    [(exported_lightmaps, "write_ktx2"), (export, "emissive_only"), (export, "viewer_page")],
+)
 def test_an_export_that_is_interrupted_changes_nothing(
-    run: Run, folder: Path, step: str, monkeypatch: pytest.MonkeyPatch
+    run: Run, folder: Path, module: ModuleType, step: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert run("export", folder, "--forms", "web", "--quiet").code == 0
     before = files_in(folder)
@@ -215,7 +219,7 @@ def test_an_export_that_is_interrupted_changes_nothing(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(export, step, interrupt)
+    monkeypatch.setattr(module, step, interrupt)
     done = run("export", folder, "--forms", "web")
     assert (done.code, done.err) == (130, "error: interrupted; nothing was written\n")
     assert files_in(folder) == before

@@ -282,3 +282,26 @@ def test_objects_with_several_lightmaps_are_all_relit(room: Path) -> None:
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
     assert shown() == ONE_PAGE
+
+
+def test_an_export_names_what_was_edited_since(room: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    def said() -> str:
+        capfd.readouterr()
+        before = dump_file()
+        assert bpy.ops.radiosity.export() == {"FINISHED"}
+        assert differences_since(before, dump_file()) == []
+        return capfd.readouterr().out
+
+    assert "since the last bake" not in said()
+    bpy.data.lights[0].energy = 5.0  # known only along with the settings of the bake
+    bpy.data.objects["Shelf"].location.x = 0.3
+    bpy.context.view_layer.update()
+    assert "changed since the last bake: 'Shelf'; the lightmaps show their light of before" in said()
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name == "Floor")
+    bpy.context.scene.radiosity.scope = "selected"
+    assert bake() == {"FINISHED"}
+    assert "changed since the last bake: 'Shelf'" in said(), "the others' lightmaps are of the first bake"
+    bpy.context.scene.radiosity.scope = "all"
+    assert bake() == {"FINISHED"}
+    assert "since the last bake" not in said()

@@ -40,7 +40,9 @@ async function start() {
   const pages = await Promise.all(index.pages.map((page) => lightmap(scene, page)));
   for (const material of container.materials) {
     for (const map of [material.albedoTexture, material.emissiveTexture]) {
-      map?.updateSamplingMode(Texture.BILINEAR_SAMPLINGMODE);
+      if (!map) continue;
+      map.updateSamplingMode(Texture.BILINEAR_SAMPLINGMODE);
+      map.anisotropicFilteringLevel = 1;
     }
     if (baked) continue;
     const told = material.metadata?.gltf?.extras?.lightmap;

@@ -26,7 +26,8 @@ async function exact(lit) {
 
 async function load(form) {
   if (form === 'baked') return new GLTFLoader().loadAsync('/export/scene_baked.glb');
-  const lit = await loadLit('/export/scene.glb', { matte: true });
+  const encoding = form === 'rgbm' ? 'rgbm' : 'ktx2';
+  const lit = await loadLit('/export/scene.glb', { matte: true, encoding });
   if (form === 'exr') await exact(lit);
   for (const material of lit.materials.values()) if (asked.get('only')) only(material);
   return lit.gltf;

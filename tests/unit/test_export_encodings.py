@@ -10,7 +10,9 @@ import pytest
 
 from radiosity_addon.exports import (
     decode_rgb9e5,
+    decode_rgbm,
     encode_rgb9e5,
+    encode_rgbm,
     png_of_linear,
     read_half_exr,
     read_ktx2,
@@ -18,6 +20,7 @@ from radiosity_addon.exports import (
     srgb_of_linear,
     write_half_exr,
     write_ktx2,
+    write_rgbm,
 )
 
 
@@ -72,8 +75,32 @@ def test_half_floats_are_off_by_a_2048th() -> None:
     np.testing.assert_allclose(found, exact, rtol=2.0**-11, atol=2.0**-25)
 
 
+def test_rgbm_is_off_by_a_255th_of_the_brightest_channel() -> None:
+    exact = colors()
+    encoded, largest = encode_rgbm(exact)
+    assert encoded.dtype == np.uint8
+    assert largest == pytest.approx(exact.max())
+    found, brightest = decode_rgbm(encoded, largest), exact.max(axis=-1)
+    bound = np.maximum(brightest, largest / 255) / 255
+    assert (np.abs(found - exact).max(axis=-1) <= bound * (1 + 1e-5)).all()
+    assert np.abs(found - exact)[brightest > largest / 2].max() <= 0.51 * largest / 255
+
+
+def test_rgbm_of_the_dark_is_black_and_keeps_its_alpha() -> None:
+    light = np.zeros((2, 2, 3))
+    encoded, largest = encode_rgbm(light)
+    assert (encoded[..., 3] > 0).all()
+    assert not decode_rgbm(encoded, largest).any()
+    light[0, 0] = np.inf, np.nan, -1.0
+    light[1, 1] = 5.0, 0.0, 2.5
+    encoded, largest = encode_rgbm(light)
+    assert largest == 5.0
+    np.testing.assert_allclose(decode_rgbm(encoded, largest)[1, 1], (5.0, 0.0, 2.5), atol=0.01)
+    assert not decode_rgbm(encoded, largest)[0, 0].any()
+
+
 def test_equal_images_give_equal_files() -> None:
-    for write in (write_half_exr, write_ktx2, png_of_linear):
+    for write in (write_half_exr, write_ktx2, png_of_linear, write_rgbm):
         assert write(colors()) == write(colors())
 
 

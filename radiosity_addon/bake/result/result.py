@@ -29,7 +29,7 @@ class LightGroup:
 class BakedObject:
     """The lightmap of one object: its UVs and the page they point into.
 
-    uv (count, 3, 2) float32: Per triangle corner, in [0, 1], v up.
+    uv (count, 3, 2) float32: Per triangle corner, in [0, 1], v up; parallel to `loops`.
     page: Index into `BakeResult.pages`.
     density: Texels per meter, the median over its surface; None if it is not known.
     share: What part of its page's used texels it has; None if it is not known.
@@ -40,6 +40,11 @@ class BakedObject:
     page: int
     density: float | None = None
     share: float | None = None
+
+    @property
+    def loops(self) -> Array:
+        """The mesh corner (loop) of each triangle corner, (t, 3)."""
+        return self.object.loops if self.object.level is None else self.object.level.loops
 
 
 @dataclass(frozen=True, eq=False)

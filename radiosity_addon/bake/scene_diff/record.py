@@ -97,7 +97,8 @@ def rounded_digest(bake_scene: BakeScene, item: BakeObject) -> str:
     scene, rows = bake_scene.scene, item.rows
     digest = hashlib.sha256(f"{item.texel_scale:.6g}".encode())
     digest.update(f"page {item.page}".encode() if item.page else b"")
-    shape = (scene.triangles[rows], scene.normals[rows])
+    levels = () if item.level is None else (item.level.triangles,)
+    shape = (scene.triangles[rows], scene.normals[rows], *levels)
     for values in (*shape, scene.reflectance[rows] / DIGEST_STEP, scene.opacity[rows] / DIGEST_STEP):
         digest.update(np.round(values, 4 if values.ndim == 3 else 0).astype(np.float32).tobytes())
     for values in (scene.in_bounces[rows], scene.in_shadows[rows]):
@@ -138,12 +139,16 @@ def _record_of(bake_scene: BakeScene, item: BakeObject, laid_out: Array | None) 
     emitter = () if bake_scene.emitter is None or not emits.any() else (bake_scene.emitter[rows][emits],)
     triangle = np.arange(item.first, item.first + item.count)
     page = (np.array(item.page),) if item.page else ()
+    level = item.level
+    faces = (item.polygon, item.loops) if level is None else (level.polygon, level.loops)
     return ObjectRecord(
-        mesh=_digest(item.polygon, item.loops, scene.areas[rows] > 0, np.array(item.texel_scale), *page),
+        mesh=_digest(*faces, scene.areas[rows] > 0, np.array(item.texel_scale), *page),
         role=_digest(
             np.array(item.bake), scene.two_sided[rows], scene.in_bounces[rows], scene.in_shadows[rows]
         ),
-        place=_digest(scene.triangles[rows], scene.normals[rows]),
+        place=_digest(
+            scene.triangles[rows], scene.normals[rows], *(() if level is None else (level.triangles,))
+        ),
         surface=_digest(scene.reflectance[rows], scene.opacity[rows], *_glass_of(scene, triangle)),
         emission=_digest(scene.emission[rows], *emitter),
         uv="" if item.uv is None or not item.bake else _digest(item.uv.astype(np.float32)),

@@ -37,6 +37,7 @@ from ...solver.hierarchy import Clusters, Hierarchy
 from ...solver.links import ClusterLinks, LightLinks, Links, no_links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
+from ..levels import with_levels
 from ..relight import DAMAGED, KeptBake, damaged
 from ..result import BakedObject, BakeResult
 from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
@@ -117,6 +118,7 @@ class StoredBake:
             BakedObject(item, geometry.uv[item.rows], page)
             for item, page in zip(baked, self._stored["pages"], strict=True)
         )
+        objects = with_levels(bake_scene, objects)
         return BakeResult(pages, objects, report["solver"], bake_scene.warnings, {}, report["atlas"])
 
 
@@ -145,7 +147,7 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) 
         "objects": kept.record.objects,
         "emission": kept.bake_scene.scene.emission,
         "of_sources": {name: getattr(kept.bake_scene, name) for name in OF_SOURCES},
-        "pages": [item.page for item in result.objects],
+        "pages": [item.page for item in result.objects if item.object.level is None],
         "report": {"solver": {**result.solver, "history": []}, "atlas": result.atlas},
         "elements": elements,
         "lit": replace(kept.lit, warm_start=kept.lit.warm_start.first()),

@@ -17,8 +17,9 @@ from ..stand_ins.stand_ins import INSTANCER
 
 def shown_again(export: Export) -> set[str]:
     """Return the names of the objects that will show something else once the export is baked."""
+    levels = {item.name for item in export.bake_scene.levels}
     pairs = zip(export.sources, export.bake_scene.objects, strict=True)
-    return {shown_by(source) for source, target in pairs if target.bake}
+    return {shown_by(source) for source, target in pairs if target.bake or target.name in levels}
 
 
 def keeping_theirs(scene: bpy.types.Scene, export: Export, is_partial: bool) -> frozenset[str]:

@@ -49,7 +49,8 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
             bpy.context.window.scene = scene
         output = output_of_export(folder, scene.name, allowed)
         digests = lightmap_digests(report)
-        made = run_through(run_export(bpy.context, form, output, digests), console, interrupts)
+        job = run_export(bpy.context, form, output, digests, compare=edited)
+        made = run_through(job, console, interrupts)
         lines = [f"exported into {folder / EXPORT_FOLDER}", *(f"  {name}" for name in made.files)]
         notes = [f"{BLEND_NAME} was changed since it was baked: it is exported as it is"] if edited else []
         console.lines([*lines, *(f"note: {note}" for note in (*notes, *made.notes))])

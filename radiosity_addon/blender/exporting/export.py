@@ -16,15 +16,10 @@ import addon_utils  # type: ignore[import-not-found]
 import bpy
 
 from ...bake.result import BakeReport
-from ...base import BakeError, Status
+from ...base import BakeError, Status, staged
 from ...exports import (
     INDEX_NAME,
     Glb,
-    GroupEntry,
-    LightmapIndex,
-    LightmapPlace,
-    NodeEntry,
-    PageEntry,
     emissive_only,
     lightmap_index,
     png_of_linear,
@@ -33,19 +28,18 @@ from ...exports import (
     static_files,
     viewer_page,
     with_lightmaps,
-    write_half_exr,
-    write_ktx2,
 )
-from ...files import PLAIN_NAMES, export_record, older_files, unique_names
+from ...files import PLAIN_NAMES, export_record, older_files
 from ...numerics import Array
-from ...options import EFFICACY, ENGINE_PADDING, Form
+from ...options import Form
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
 from .bake_units import bake_units
+from .edits_since_bake import edits_since_bake
 from .evaluated_colors import evaluate_channel, image_of, side_factor
 from .export_materials import ALPHA, BASE, CHANNELS, EMISSION
-from .export_scene import PREFIX, ExportScene, export_scene, lamps_in
-from .shown_lightmaps import light_of
+from .export_scene import PREFIX, ExportScene, export_scene
+from .exported_lightmaps import ExportedLightmaps, endings, rgbm_names
 
 LIT, BAKED, VIEWER = "scene.glb", "scene_baked.glb", "viewer.html"
 REPORT_VERSION = 1
@@ -63,15 +57,23 @@ def foreseen_files(form: Form) -> list[str]:
     """Return the names of the files that an export writes in any case."""
     fixed = [LIT, INDEX_NAME, *([BAKED] if form.lit_scene else []), *([VIEWER] if form.viewer else [])]
     (stem,) = PLAIN_NAMES.shared_pages(1)
-    return [*fixed, *static_files(form), f"{stem}.exr", f"{stem}.ktx2"]
+    return [*fixed, *static_files(form), *(f"{stem}{ending}" for ending in endings(form))]
 
 
 def run_export(
-    context: bpy.types.Context, form: Form, folder: OutputFolder, lightmaps: Mapping[str, str]
+    context: bpy.types.Context,
+    form: Form,
+    folder: OutputFolder,
+    lightmaps: Mapping[str, str],
+    *,
+    compare: bool = True,
+    in_background: bool = False,
 ) -> Generator[Status, None, ExportReport]:
     """Export the context's scene into a folder; all files are there at once, or none.
 
     lightmaps: Digests of the files of the lightmaps that are shown, for the report.
+    compare: Whether the scene may have been edited since the bake: the report says what was.
+    in_background: Whether a window waits.
 
     Raises
     ------
@@ -82,8 +84,11 @@ def run_export(
         output.expect(foreseen_files(form))
         files = static_files(form)
         yield Status("export", 0.0)
+        edits: list[str] = []
+        if compare:
+            edits = yield from staged(edits_since_bake(context, in_background), "compare", 0.0, 0.1)
         with closing(export_scene(context)) as scene:
-            light = _Lightmaps.of(scene, sum_groups=form.sum_groups)
+            light = ExportedLightmaps.of(scene, form)
             output.expect(light.file_names)
             yield Status("colors", 0.1)
             colors = _evaluated(context, scene, light, every=form.lit_scene)
@@ -96,9 +101,9 @@ def run_export(
             )
             files[LIT] = lit.to_bytes()
             yield Status("lightmaps", 0.6)
-            images = light.files()
+            images, entries = light.files()
             files |= images
-            files[INDEX_NAME] = lightmap_index(light.index(scene, places)).encode()
+            files[INDEX_NAME] = lightmap_index(light.index(scene, places, entries)).encode()
             if form.lit_scene:
                 yield Status("baked glTF", 0.8)
                 pages = _light_pages(scene, light, colors)
@@ -112,112 +117,20 @@ def run_export(
             path = output.staging / name
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(data)
-        left = {BAKED, VIEWER} - files.keys()
+        left = {BAKED, VIEWER, *rgbm_names(light.stems)} - files.keys()
         record = export_record(output.earlier, form.names, lightmaps, light.mix, left)
         output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
         output.publish()
         older = [f"{name} is of earlier lightmaps" for name in older_files(record, output.path)]
-    return ExportReport(tuple(sorted(files)), (*light.notes, *older))
-
-
-@dataclass(frozen=True, eq=False)
-class _Lightmaps:
-    """The pages of an export as arrays, and the names of their files.
-
-    groups: Light groups that have lightmaps of their own, with their factors.
-    mix: The factors of all light groups.
-    """
-
-    light: str
-    pages: tuple[Array, ...]
-    groups: tuple[tuple[str, tuple[float, float, float], tuple[Array, ...]], ...]
-    mix: dict[str, tuple[float, float, float]]
-    stems: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...]
-
-    @classmethod
-    def of(cls, scene: ExportScene, *, sum_groups: bool) -> _Lightmaps:
-        shown = scene.shown
-        pages = tuple(shown.page(number) for number in range(len(shown.images)))
-        groups = tuple(
-            (group.name, group.factor, tuple(map(light_of, group.images)))
-            for group in (() if sum_groups else shown.groups)
-        )
-        mix = {group.name: group.factor for group in shown.groups}
-        taken: set[str] = set()
-        names = [PLAIN_NAMES.shared_pages(len(pages), group) for group in ("", *(each[0] for each in groups))]
-        stems = tuple(tuple(unique_names(of, "", taken)) for of in names)
-        notes = list(dict.fromkeys(note for material in scene.materials for note in material.notes))
-        if shown.light == "indirect":
-            notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
-        uneven = [
-            f"{page.shape[1]} × {page.shape[0]}" for page in pages if page.shape[0] % 4 or page.shape[1] % 4
-        ]
-        if uneven:
-            notes.append(f"a page of {uneven[0]} texels cannot be compressed: choose a multiple of 4")
-        if shown.padding is not None and shown.padding < ENGINE_PADDING:
-            notes.append(
-                f"charts are {shown.padding} texels apart, enough for bilinear filters: for bicubic ones and "
-                f"compressed textures bake with a padding of {ENGINE_PADDING}"
-            )
-        return cls(shown.light, pages, groups, mix, stems, tuple(notes))
-
-    @property
-    def keeps_lamps(self) -> bool:
-        """Whether lamps are not in the lightmap."""
-        return self.light == "indirect"
-
-    @property
-    def ktx2_names(self) -> list[str]:
-        return [f"{stem}.ktx2" for stem in self.stems[0]]
-
-    @property
-    def file_names(self) -> list[str]:
-        return [f"{stem}{ending}" for of in self.stems for stem in of for ending in (".exr", ".ktx2")]
-
-    @property
-    def sizes(self) -> dict[int, tuple[int, int]]:
-        """Width and height of each page."""
-        return {number: (page.shape[1], page.shape[0]) for number, page in enumerate(self.pages)}
-
-    def files(self) -> dict[str, bytes]:
-        """Return the files of all pages."""
-        found = {}
-        for stems, pages in zip(self.stems, (self.pages, *(each[2] for each in self.groups)), strict=True):
-            for stem, page in zip(stems, pages, strict=True):
-                found[f"{stem}.exr"], found[f"{stem}.ktx2"] = write_half_exr(page), write_ktx2(page)
-        return found
-
-    def index(self, scene: ExportScene, places: Mapping[str, LightmapPlace]) -> LightmapIndex:
-        """Return what lightmaps.json says.
-
-        places: Of objects that share a mesh.
-        """
-        entries = [
-            tuple(_entry(page, stem) for page, stem in zip(pages, stems, strict=True))
-            for stems, pages in zip(self.stems, (self.pages, *(each[2] for each in self.groups)), strict=True)
-        ]
-        groups = [
-            GroupEntry(name, factor, of)
-            for (name, factor, _), of in zip(self.groups, entries[1:], strict=True)
-        ]
-        nodes = []
-        for name, page in scene.baked.items():
-            place = places.get(name, LightmapPlace((1.0, 1.0), (0.0, 0.0)))
-            nodes.append(NodeEntry(name, page, scale=place.scale, offset=place.offset))
-        lamps = [] if self.keeps_lamps else lamps_in(scene.objects)
-        return LightmapIndex(self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes)
-
-
-def _entry(page: Array, stem: str) -> PageEntry:
-    height, width = page.shape[:2]
-    return PageEntry(width, height, f"{stem}.exr", f"{stem}.ktx2")
+    return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *older))
 
 
 _Colors = dict[str, list[Array]]
 
 
-def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps, *, every: bool) -> _Colors:
+def _evaluated(
+    context: bpy.types.Context, scene: ExportScene, light: ExportedLightmaps, *, every: bool
+) -> _Colors:
     """Return the channels that are needed, each on all pages: every color, or what glTF cannot express."""
     needed = {channel for each in scene.materials for channel in each.evaluated}
     if every:
@@ -239,7 +152,9 @@ def _evaluated(context: bpy.types.Context, scene: ExportScene, light: _Lightmaps
 
 def evaluated_materials(context: bpy.types.Context, scene: ExportScene) -> None:
     """Have the temporary scene's materials read images of what glTF cannot express of them."""
-    _show_images(scene, _evaluated(context, scene, _Lightmaps.of(scene, sum_groups=True), every=False))
+    _show_images(
+        scene, _evaluated(context, scene, ExportedLightmaps.of(scene, Form((), sum_groups=True)), every=False)
+    )
 
 
 def _show_images(scene: ExportScene, colors: _Colors) -> None:
@@ -310,7 +225,7 @@ def _window_kept(context: bpy.types.Context) -> Iterator[None]:
 
 
 def _light_pages(
-    scene: ExportScene, light: _Lightmaps, colors: _Colors
+    scene: ExportScene, light: ExportedLightmaps, colors: _Colors
 ) -> dict[tuple[int, bool], tuple[bytes, float]]:
     """Return the images of what leaves surfaces, for each page, and for glowing materials apart."""
     found = {}

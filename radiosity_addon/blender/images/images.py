@@ -126,7 +126,7 @@ def names_of_any(
 def _objects(result: BakeResult) -> list[str]:
     """Return the name of each page's object."""
     found = [""] * len(result.pages)
-    for baked in result.objects:
+    for baked in reversed(result.objects):  # levels of detail come last
         found[baked.page] = baked.object.name
     return found
 

@@ -37,7 +37,8 @@ from ..cycles.surface_evaluation import foreseen_bytes
 from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
-from ..scene_export.export import all_glass, check_names, check_pages, chosen_pieces
+from ..scene_export.export import all_glass, check_names, chosen_pieces
+from ..scene_export.page_checks import check_pages
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph

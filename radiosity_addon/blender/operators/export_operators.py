@@ -88,7 +88,7 @@ class RADIOSITY_OT_export(Conditional, WindowJob, bpy.types.Operator):
 
     conditions = (no_bake_runs, shows_lightmaps, in_object_mode)
 
-    def _start(self, context: bpy.types.Context, _in_window: bool) -> Any:
+    def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
         from ..exporting.export import run_export
         from ..files.output import OutputFolder
 
@@ -98,7 +98,8 @@ class RADIOSITY_OT_export(Conditional, WindowJob, bpy.types.Operator):
         if folder is None:
             raise BakeError("save the file first: the export is written next to it")
         self._folder = folder
-        return run_export(context, form, OutputFolder(folder), shown_versions())
+        output = OutputFolder(folder)
+        return run_export(context, form, output, shown_versions(), in_background=in_window)
 
     def _succeeded(self, _context: bpy.types.Context, _in_window: bool) -> None:
         self.report({"INFO"}, f"Exported {len(self._report.files)} files into {self._folder}")

@@ -48,6 +48,7 @@ from ..scene_records.scene_objects import (
     unknown_objects,
     visible_objects,
 )
+from .levels_of_detail import share_levels
 
 MOMENT, NO_WINDOW_MOMENT = 0.05, 1.0
 """Seconds for which the scene is shown as a render would, if that is enough to read an object: while a window
@@ -178,6 +179,7 @@ class _Collector:
                 if piece is not None:
                     collected.pieces.append(piece)
         collected.warnings.extend(self._unknown)
+        share_levels(collected)
         return collected
 
     def _prepare(self, depsgraph: bpy.types.Depsgraph) -> None:

@@ -28,6 +28,8 @@ from ..scene_records.render_options import option_warnings, world_of
 from ..scene_records.render_state import leave_edit_mode, render_depsgraph
 from ..session.background import elsewhere
 from .collect import collect_steps
+from .levels_of_detail import level_of_detail, pieces_named, with_levels
+from .page_checks import check_pages
 
 T = TypeVar("T")
 
@@ -76,7 +78,7 @@ def export_steps(
     check_names(context, collected.pieces, settings)
     chosen = chosen_pieces(context, collected.pieces, settings.objects)
     check_pages(chosen, settings)
-    for piece in chosen:
+    for piece in with_levels(chosen, collected.pieces):
         _check_uv_layers(piece)
     yield 0.5
     background = world_of(context)
@@ -133,6 +135,7 @@ def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) ->
                 uv=None if uv is None else np.ascontiguousarray(uv[:, order]),
                 texel_scale=piece.role.texel_scale,
                 page=piece.role.page,
+                level=level_of_detail(piece),
             )
         )
         in_bounces.append(np.full(len(mesh), piece.role.in_bounces))
@@ -304,7 +307,7 @@ def chosen_pieces(
         return bakeable
     chosen: list[Piece] = []
     for name in names:
-        named = [piece for piece in pieces if name in piece.names]
+        named = pieces_named(pieces, name)
         bakeable = [piece for piece in named if piece.bakeable]
         if not bakeable:
             linked = [piece for piece in named if piece.linked]
@@ -323,19 +326,6 @@ def check_names(context: bpy.types.Context, pieces: list[Piece], settings: BakeS
             # What has no faces, or does not show, is left out anyway.
             if name not in known and name not in context.scene.objects:
                 raise UsageError(f"{option}: no object '{name}'" + _did_you_mean(name, known))
-
-
-def check_pages(chosen: list[Piece], settings: BakeSettings) -> None:
-    """Refuse pages of objects that a bake will not have."""
-    if settings.atlas != "shared" or settings.texel_density is not None:
-        return
-    beyond = next((piece for piece in chosen if piece.role.page > settings.pages), None)
-    if beyond is not None:
-        has = "1 page" if settings.pages == 1 else f"{settings.pages} pages"
-        raise UsageError(
-            f"object '{beyond.source.object_name}' is to be on page {beyond.role.page}, but the bake has "
-            f"{has}: raise the number of pages, or set the object's Page to 0"
-        )
 
 
 def _did_you_mean(name: str, known: set[str]) -> str:

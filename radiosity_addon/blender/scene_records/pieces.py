@@ -17,6 +17,20 @@ from .light_membership import PlaceGroups
 from .object_roles import BAKE, IGNORE, Role
 
 
+@dataclass(frozen=True, eq=False)
+class CoarseLevel:
+    """A coarser level of detail.
+
+    base: The name of the finest one, whose lightmap it shows.
+    matrix (4, 4): Of the finest one.
+    mesh: Its own triangles; the scene has none of them.
+    """
+
+    base: str
+    matrix: np.ndarray
+    mesh: MeshArrays
+
+
 @dataclass(frozen=True)
 class Piece:
     """One mesh at one place.
@@ -45,6 +59,8 @@ class Piece:
         What is not followed, should it emit.
     groups : PlaceGroups
         The light group of what it emits.
+    level : CoarseLevel or None
+        Of a coarser level of detail, whose `mesh` is empty.
     """
 
     source: ExportSource
@@ -60,6 +76,7 @@ class Piece:
     has_lightmap_layer: bool
     linking: tuple[BakeWarning, ...]
     groups: PlaceGroups
+    level: CoarseLevel | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

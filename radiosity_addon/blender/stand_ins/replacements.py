@@ -99,7 +99,7 @@ def dress(
     mesh.name = f"{source.name} (Lightmap)"
     if baked is not None:
         check_room(mesh, source.name)
-        put_layer_on(mesh, baked.object.loops, baked.uv, source.name)
+        put_layer_on(mesh, baked.loops, baked.uv, source.name)
     _fill_stand_in(replacement)
 
 
@@ -179,7 +179,7 @@ def _show_in_place(obj: bpy.types.Object, replacement: Replacement) -> None:
     mesh, baked, copies = replacement.mesh, replacement.baked, replacement.copies
     if obj.data != mesh or baked is None:
         raise BakeError(f"object '{obj.name}' changed while it was being baked: bake again")
-    put_layer_on(mesh, baked.object.loops, baked.uv, obj.name)
+    put_layer_on(mesh, baked.loops, baked.uv, obj.name)
     if not mesh.materials:
         mesh.materials.append(copies[0])
         record = layer_record(mesh)

@@ -5,6 +5,7 @@
    scene.add(lit.scene);
 
    matte: true shows base color × lightmap alone, without highlights, reflections or other lamps' shine.
+   encoding: 'rgbm' reads the PNG images of an export with the form rgbm, where KTX2 cannot be had.
    lit.mix({ Kitchen: [1, 0.9, 0.8] }) mixes light groups by color times strength. */
 
 import {
@@ -18,7 +19,9 @@ const E5B9G9R9 = 123;
 let zstd = null;
 
 /** Load a scene. `read(name)` returns a file as an ArrayBuffer; without it files are fetched next to `url`. */
-export async function loadLit(url, { matte = false, read = null, loader = new GLTFLoader() } = {}) {
+export async function loadLit(url, {
+  matte = false, encoding = 'ktx2', read = null, loader = new GLTFLoader(),
+} = {}) {
   const folder = url.slice(0, url.lastIndexOf('/') + 1);
   read ??= async (name) => {
     const answer = await fetch(folder + name);
@@ -27,7 +30,11 @@ export async function loadLit(url, { matte = false, read = null, loader = new GL
   };
   const gltf = await loader.parseAsync(await read(url.slice(folder.length)), folder);
   const index = JSON.parse(new TextDecoder().decode(await read('lightmaps.json')));
-  const open = async (page) => readKtx2(await read(page.ktx2));
+  const open = async (page) => {
+    if (!page[encoding]) throw new Error(`lightmaps.json names no ${encoding} files: export with the form ${encoding}`);
+    const file = await read(page[encoding]);
+    return encoding === 'rgbm' ? readRgbm(file, page.rgbm_range) : readKtx2(file);
+  };
   const pages = await Promise.all(index.pages.map(open));
   const groups = await Promise.all(index.light_groups.map(async (group) => (
     { ...group, pages: await Promise.all(group.pages.map(open)) })));
@@ -160,6 +167,38 @@ export async function readKtx2(buffer) {
   return { width, height, packed: new Uint32Array(data.slice().buffer), colors: null };
 }
 
+/** Read a PNG of RGBM: { width, height, colors }, rows from the top. Browsers' own decoders multiply by alpha. */
+export async function readRgbm(buffer, range) {
+  const view = new DataView(buffer), parts = [];
+  if (view.getUint32(0) !== 0x89504e47) throw new Error('not a PNG file');
+  const [width, height, kind] = [view.getUint32(16), view.getUint32(20), view.getUint32(24)];
+  if (kind !== 0x08060000 || view.getUint8(28)) throw new Error('not a PNG file of 8 bits with alpha');
+  for (let place = 8; place < buffer.byteLength; place += 12 + view.getUint32(place)) {
+    if (view.getUint32(place + 4) === 0x49444154) parts.push(new Uint8Array(buffer, place + 8, view.getUint32(place)));
+  }
+  const packed = new Blob(parts).stream().pipeThrough(new DecompressionStream('deflate'));
+  const data = new Uint8Array(await new Response(packed).arrayBuffer());
+  const row = 4 * width, bytes = new Uint8Array(row * height), colors = new Float32Array(row * height);
+  for (let y = 0; y < height; y++) {
+    const filter = data[y * (row + 1)];
+    for (let x = 0; x < row; x++) {
+      const at = y * row + x;
+      const a = x < 4 ? 0 : bytes[at - 4], b = y ? bytes[at - row] : 0, c = x < 4 || !y ? 0 : bytes[at - row - 4];
+      bytes[at] = data[at + y + 1] + [0, a, b, (a + b) >> 1, paeth(a, b, c)][filter];
+    }
+  }
+  for (let at = 0; at < bytes.length; at += 4) {
+    const unit = range * bytes[at + 3] / 255 ** 2;
+    colors.set([bytes[at] * unit, bytes[at + 1] * unit, bytes[at + 2] * unit, 1], at);
+  }
+  return { width, height, colors };
+}
+
+function paeth(a, b, c) {
+  const [toA, toB, toC] = [b - c, a - c, a + b - 2 * c].map(Math.abs);
+  return toA <= toB && toA <= toC ? a : toB <= toC ? b : c;
+}
+
 /** The colors of a page as floats, four a texel; decoded once. */
 export function colorsOf(page) {
   if (page.colors) return page.colors;
@@ -172,6 +211,7 @@ export function colorsOf(page) {
 }
 
 function textureOf(page) {
+  if (!page.packed) return prepared(new DataTexture(page.colors, page.width, page.height, RGBAFormat, FloatType));
   return prepared(new DataTexture(page.packed, page.width, page.height, RGBFormat, UnsignedInt5999Type));
 }
 

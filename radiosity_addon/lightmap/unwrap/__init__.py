@@ -8,6 +8,7 @@ from __future__ import annotations
 from .atlas import Atlas, AtlasObject, build_atlas
 from .atlas_input import AtlasInput, AtlasOptions
 from .dominant_object import greedy_object, share_of
+from .level_uvs import uvs_of_level
 from .packing import Limits, padding_for, page_size
 from .page_assignment import ChartTotals, assign_pages
 
@@ -24,4 +25,5 @@ __all__ = [
     "padding_for",
     "page_size",
     "share_of",
+    "uvs_of_level",
 ]
