@@ -30,13 +30,15 @@ LAMP_TURN = -40
 GLOWS = {"Bulb": BULB_RADIANCE, "Screen": SCREEN_RADIANCE}
 
 
-def build_office(detail: float = 1.0) -> bpy.types.Scene:
+def build_office(detail: float = 1.0, ceiling_lamps: int = 0) -> bpy.types.Scene:
     """Fill the empty open file.
 
     Parameters
     ----------
     detail : float
         1 for 39,000 triangles; less makes round things coarser and leaves furniture out.
+    ceiling_lamps : int
+        So many small lamps under the ceiling instead of panels and desk lamps, of the same power together.
     """
     scene = bpy.context.scene
     scene.name = "Office"
@@ -44,7 +46,10 @@ def build_office(detail: float = 1.0) -> bpy.types.Scene:
     materials |= {name: glowing(name, radiance) for name, radiance in GLOWS.items()}
     for name, shape in pieces(detail):
         add_mesh(scene, name, shape, materials)
-    _add_lamps(scene, detail)
+    if ceiling_lamps:
+        _add_ceiling_lamps(scene, ceiling_lamps)
+    else:
+        _add_lamps(scene, detail)
     even_sky(scene, SKY)
     _add_camera(scene)
     return scene
@@ -146,6 +151,31 @@ def _add_lamps(scene: bpy.types.Scene, detail: float) -> None:
             turn = np.radians(LAMP_TURN)
             head = (x - 0.7 + 0.3 * np.cos(turn), y + 0.25 + 0.3 * np.sin(turn), 0.74 + 0.45)
             add(scene, f"Bulb {number}", lamp, head)
+
+
+def _add_ceiling_lamps(scene: bpy.types.Scene, count: int) -> None:
+    """Hang bulbs and small squares in turn, evenly spread."""
+    power = len(PANELS) * PANEL_POWER + 3 * DESK_LAMP_POWER
+    for number in range(count):
+        lamp = bpy.data.lights.new("Lamp", "POINT" if number % 2 else "AREA")
+        if number % 2:
+            lamp.shadow_soft_size = 0.03
+        else:
+            lamp.shape, lamp.size = "SQUARE", 0.1
+        lamp.energy, lamp.color = power / count, (1.0, 0.9, 0.76)
+        x, y = (_radical_inverse(number + 1, base) for base in (2, 3))
+        place = 0.3 + x * (WIDTH - 0.6), 0.3 + y * (DEPTH - 0.6), HEIGHT - 0.15
+        add(scene, f"Lamp {number}", lamp, place)
+
+
+def _radical_inverse(number: int, base: int) -> float:
+    """Return the digits of a number mirrored at the point: evenly spread in [0, 1)."""
+    value, step = 0.0, 1.0 / base
+    while number:
+        number, digit = divmod(number, base)
+        value += step * digit
+        step /= base
+    return value
 
 
 def _add_camera(scene: bpy.types.Scene) -> None:

@@ -23,6 +23,7 @@ from ..lightmap.lighting import (
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas
+from ..lights import grouped
 from ..numerics import Array, Scratch, give_back, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
@@ -76,6 +77,10 @@ MOST_SHOWN = 1 << 22
 
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
+
+LAMPS_PER_RAY = 16
+"""More lamps than so many for each shadow ray of one are grouped, unless their lights are kept apart: one by
+one each asks two rays at least, together they ask 64 times as many as one where most of them disagree."""
 
 PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
@@ -140,7 +145,7 @@ def _bake(
     lighting_seconds = stages.light * len(geometry) / max(sum(plan.texels), 1.0)
     solving, lighting, encoding = rest.expecting([stages.solve, lighting_seconds, stages.encode])
     with timed(seconds, "solve"):
-        solution = solve_scene(bake_scene, quality.solver, solving)
+        solution = solve_scene(bake_scene, quality.solver, solving, apart=keep)
     lighting.stage("light", 0.0, 1.0).at(0.0)
     give_back()
     is_shown = share_out_memory(geometry, settings, keep)
@@ -268,8 +273,13 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 
-def solve_scene(bake_scene: BakeScene, settings: SolverSettings, progress: Progress) -> Solution:
-    """Solve, with a picture of the solution at first, now and then, and at the end."""
+def solve_scene(
+    bake_scene: BakeScene, settings: SolverSettings, progress: Progress, apart: bool = True
+) -> Solution:
+    """Solve, with a picture of the solution at first, now and then, and at the end.
+
+    apart: Whether every lamp's light must be known; else many lamps are grouped.
+    """
     next_picture, last = 0.0, None
 
     def look(state: SolverState | None) -> Picture | None:
@@ -283,7 +293,10 @@ def solve_scene(bake_scene: BakeScene, settings: SolverSettings, progress: Progr
 
     solving = progress.stage("solve", 0.0, 1.0, look)
     solving.at(0.0)
-    solution = solve(bake_scene.scene, settings, solving)
+    scene = bake_scene.scene
+    if not apart:
+        scene = scene.with_lights(grouped(scene.lights, most=LAMPS_PER_RAY * settings.shadow_rays))
+    solution = solve(scene, settings, solving)
     next_picture = 0.0
     solving.at(1.0, last)
     return solution

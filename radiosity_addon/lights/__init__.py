@@ -17,7 +17,8 @@ from .environment import (
     pixel_bounds,
     solid_angles,
 )
-from .light import Emitter, Lamp, Light
+from .lamp_group import LampGroup, each_lamp, grouped
+from .light import Emitter, Lamp, Light, Rays
 from .point import PointLight, SpotLight
 from .sun_and_sky import EnvironmentLight, SunLight, light_strengths
 
@@ -29,14 +30,18 @@ __all__ = [
     "EnvironmentImage",
     "EnvironmentLight",
     "Lamp",
+    "LampGroup",
     "Light",
     "PointLight",
+    "Rays",
     "SkyPatch",
     "SkyTable",
     "SpotLight",
     "SunLight",
     "bright_patches",
+    "each_lamp",
     "even_part",
+    "grouped",
     "light_strengths",
     "pixel_bounds",
     "solid_angles",

@@ -79,7 +79,7 @@ class AreaLight(Emitter):
     def emit(self, place: Samples, way: Samples) -> Rays:
         """Return rays uniform over the lamp, cosine-distributed (see `Emitter.emit`)."""
         normal, unit = self._normal, np.asarray(way, dtype=np.float64)
-        if self._is_open:
+        if self.is_open:
             local, shares = cosine_hemisphere(unit), np.ones(len(unit))
         else:
             local = uniform_cone(unit, 2.0 * np.sin(0.25 * self.spread) ** 2)
@@ -92,9 +92,9 @@ class AreaLight(Emitter):
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the irradiance per power, F / area (see `Lamp.unit_irradiance`)."""
-        if not self._is_open:
+        if not self.is_open:
             return self._narrow_irradiance(points, normals)
-        center, half_u, half_v = self._half_axes()
+        center, half_u, half_v = self.half_axes
         if self.shape == "ellipse":
             return point_to_ellipse(points, normals, center, half_u, half_v) / self.area
         corners = center + np.stack([-half_u - half_v, half_u - half_v, half_u + half_v, half_v - half_u])
@@ -102,7 +102,7 @@ class AreaLight(Emitter):
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
         """Return rays to samples uniform over the emitting area of the lamp (see `Lamp.shadow_rays`)."""
-        if not self._is_open:
+        if not self.is_open:
             directions, distances, weights = self._narrow_rays(points, normals, np.asarray(u, np.float64))
             return directions, distances, weights / u.shape[1]
         samples = self._points(np.asarray(u, dtype=np.float64))
@@ -115,12 +115,12 @@ class AreaLight(Emitter):
 
     def _points(self, square: Float64Array) -> Float64Array:
         """Map (…, 2) points of the unit square to uniform points of the lamp, (…, 3)."""
-        center, half_u, half_v = self._half_axes()
+        center, half_u, half_v = self.half_axes
         across = concentric_disk(square) if self.shape == "ellipse" else 2.0 * square - 1.0
         return center + across @ np.stack([half_u, half_v])
 
     @property
-    def _is_open(self) -> bool:
+    def is_open(self) -> bool:
         """Whether there is no soft-box."""
         return self.spread > np.pi - 1e-4
 
@@ -151,7 +151,7 @@ class AreaLight(Emitter):
 
     def _shines_on(self, points: Float64Array) -> npt.NDArray[np.bool_]:
         """Return (n,) whether a point may be in the beam: its disk meets the circle around the lamp."""
-        center, half_u, half_v = self._half_axes()
+        center, half_u, half_v = self.half_axes
         above = points - center
         height = above @ self._normal
         aside = np.linalg.norm(above - height[:, None] * self._normal, axis=1)
@@ -165,7 +165,7 @@ class AreaLight(Emitter):
         The lamp's plane is measured in half axes: s across, where strip after strip is cut out of both
         the disk and the lamp, and t along the strips.
         """
-        center, half_u, half_v = self._half_axes()
+        center, half_u, half_v = self.half_axes
         above = points - center
         height = above @ self._normal
         radius = np.maximum(height, 0.0)[:, None] * np.tan(0.5 * self.spread)
@@ -198,5 +198,7 @@ class AreaLight(Emitter):
             radiance * throughput(ray_geometry_term(cosines, facing, distances), 1.0, sampled),
         )
 
-    def _half_axes(self) -> tuple[Float64Array, Float64Array, Float64Array]:
+    @property
+    def half_axes(self) -> tuple[Float64Array, Float64Array, Float64Array]:
+        """(3,) float64 thrice [m]: its center, and half of each edge vector."""
         return np.asarray(self.position), 0.5 * np.asarray(self.edge_u), 0.5 * np.asarray(self.edge_v)

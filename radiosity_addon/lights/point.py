@@ -84,7 +84,7 @@ class _Bulb(Emitter):
         """Return rays whose weights leave the attenuation out and average to irradiance per intensity."""
         toward, distance = directions_to(np.asarray(self.position) - points)
         if self.soft_falloff or self.radius == 0.0:
-            return self._disk_rays(toward, distance, normals, u)
+            return disk_rays(toward, distance, self.radius, normals, u)
         return self._sphere_rays(toward, distance, normals, u)
 
     def _starts(self, place: Samples, directions: Float64Array) -> Float64Array:
@@ -94,18 +94,6 @@ class _Bulb(Emitter):
         bulge = np.zeros(len(across)) if self.soft_falloff else np.sqrt(np.maximum(square, 0.0))
         local = np.concatenate([across, bulge[:, None]], axis=1)
         return np.asarray(np.asarray(self.position) + to_world(local[:, None], directions)[:, 0])
-
-    def _disk_rays(
-        self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
-    ) -> Rays:
-        """Sample the disk across `toward` by area."""
-        on_disk = self.radius * concentric_disk(u.astype(np.float64))
-        depth = np.broadcast_to(distance[:, None, None], (*on_disk.shape[:-1], 1))
-        directions, distances = directions_to(to_world(np.concatenate([on_disk, depth], axis=-1), toward))
-        cosine = row_cosines(directions, normals)
-        facing = np.einsum("ikj,ij->ik", directions, toward)
-        # The disk's radiance times its area is the intensity.
-        return directions, distances, ray_geometry_term(cosine, facing, distances)
 
     def _sphere_rays(
         self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
@@ -251,8 +239,7 @@ class SpotLight(_Bulb):
         above = directions @ self._round_axis - edge
         if self.blend == 0.0:
             return np.where(above > 0.0, 1.0, 0.0)
-        step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
-        return step * step * (3.0 - 2.0 * step)
+        return smoothstep(np.clip(above / (self.blend * self._opening), 0.0, 1.0))
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the irradiance per power; where the cone's edge crosses the lamp, averaged over it."""
@@ -285,3 +272,25 @@ class SpotLight(_Bulb):
             spread = np.arcsin(np.minimum(self.radius / np.maximum(distance, np.finfo(float).tiny), 1.0))
         crosses: npt.NDArray[np.bool_] = (off_axis + spread > plateau) & (off_axis - spread < half)
         return crosses & (spread > 0.0)
+
+
+def disk_rays(
+    toward: Float64Array,
+    distance: Float64Array,
+    radius: float | Float64Array,
+    normals: Float64Array,
+    u: Samples,
+) -> Rays:
+    """Sample disks across `toward` by area, of one `radius` or (n, 1, 1); weights per intensity."""
+    on_disk = radius * concentric_disk(u.astype(np.float64))
+    depth = np.broadcast_to(distance[:, None, None], (*on_disk.shape[:-1], 1))
+    directions, distances = directions_to(to_world(np.concatenate([on_disk, depth], axis=-1), toward))
+    cosine = row_cosines(directions, normals)
+    facing = np.einsum("ikj,ij->ik", directions, toward)
+    # The disk's radiance times its area is the intensity.
+    return directions, distances, ray_geometry_term(cosine, facing, distances)
+
+
+def smoothstep(step: Float64Array) -> Float64Array:
+    """Return how a spot's edge fades, by the way across it from 0 to 1."""
+    return step * step * (3.0 - 2.0 * step)

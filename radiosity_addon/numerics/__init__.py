@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .arrays import Array
 from .bilinear import texels_around
+from .curve import along_curve
 from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .heap import give_back
 from .meshes import connected_components, connected_faces, numbered, weld
@@ -72,6 +73,7 @@ __all__ = [
     "Scratch",
     "Stream",
     "TriangleTree",
+    "along_curve",
     "areas",
     "brdf_of_reflectance",
     "clip_half_plane",

@@ -47,11 +47,13 @@ class Stream(IntEnum):
     AIMED_DIRECTIONS = 5
     AIMED_STARTS = 6
 
-    # Of points: shadow rays to emissive groups and to lamps, which these two are added to.
+    # Of points: shadow rays to emissive groups and to lamps, which these are added to; the last one to the
+    # streams of rays that follow the first to many lamps.
     EMITTER_SHADOWS = 17
     LAMP_SHADOWS = 31
     SHADOW_RAYS = 1
     SHADOW_STARTS = 2
+    LEARNED_SHADOWS = 2
 
     # Of triangles, without the bake's seed.
     BACK_PROBES = 83
@@ -66,7 +68,7 @@ SHARED = {
         {"PAIR_RECEIVER", "CLUSTER_PAIR_RECEIVER", "LIGHT_POINTS", "SHADOW_RAYS"}
     ): "pairs of elements, of clusters; nodes; added to the streams of shadows",
     frozenset(
-        {"PAIR_SOURCE", "CLUSTER_PAIR_RECEIVER_FACE", "FOOTPRINT", "SHADOW_STARTS"}
+        {"PAIR_SOURCE", "CLUSTER_PAIR_RECEIVER_FACE", "FOOTPRINT", "SHADOW_STARTS", "LEARNED_SHADOWS"}
     ): "pairs of elements, of clusters; points; added to the streams of shadows",
     frozenset({"PAIR_SOURCE_FACE", "CLUSTER_PAIR_SOURCE", "GATHER_DIRECTIONS"}): "pairs; points",
     frozenset({"CLUSTER_PAIR_SOURCE_FACE", "GATHER_STARTS"}): "pairs; points",

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..lights import AreaLight, Emitter, Lamp, Light, PointLight, SpotLight
+from ..lights import AreaLight, Emitter, Lamp, Light, PointLight, SpotLight, each_lamp
 from ..numerics import Array, connected_components, double_area_vectors
 
 LEAST_VOLUME = 1e-9
@@ -126,7 +126,7 @@ def _boxes_of_emitters(triangles: Array) -> Array:
 def _boxes_of_lamps(lights: Sequence[Light]) -> Array:
     """Return (n, 2, 3) boxes around lamps in the scene."""
     boxes = np.zeros((0, 2, 3))
-    for light in lights:
+    for light in each_lamp(lights):
         if isinstance(light, PointLight | SpotLight):
             middle, reach = np.asarray(light.position), light.radius
         elif isinstance(light, AreaLight):

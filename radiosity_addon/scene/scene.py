@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -82,6 +83,12 @@ class Scene:
     def layers(self) -> Layers:
         """The sides that coincident sides cover."""
         return Layers(self)
+
+    def with_lights(self, lights: Sequence[Light]) -> Scene:
+        """Return the same triangles with other lights of the same kinds in the same places."""
+        scene = copy(self)
+        scene.lights = tuple(lights)
+        return scene
 
     @property
     def solid(self) -> Array:

@@ -15,8 +15,8 @@ from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..state import SolverState
 from .footprints import Footprints, SpreadPoints
+from .group_shadows import shadow_share
 from .light_gains import LightGains
-from .soft_shadows import ShadowShare
 
 NEAR_FACTOR = 0.05
 """Form factor beyond which emissive faces are so near that it may change over a texel."""
@@ -117,7 +117,7 @@ class DirectLight:
         glows = isinstance(light, EmitterGroup)
         caster = self._state.caster if glows else self._state.caster.for_lamps
         gain = spread.gain(light, NEAR_FACTOR if glows else 0.0, progress.part(0.0, 0.1))
-        share = ShadowShare(caster, light, spread, asked.seed, settings.threads)
+        share = shadow_share(caster, light, spread, asked.seed, settings.threads)
         unblocked = share.at_points(gain, rays or settings.shadow_rays, progress.part(0.1, 1.0))
         if unblocked.ndim == 2:
             for rows in tiles(len(gain)):

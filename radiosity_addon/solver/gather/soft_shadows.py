@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...lights import Lamp
+from ...lights import Lamp, Rays
 from ...numerics import Array, Stream, fill_chunks, marked, row_numbers, stratified_square, tiles
 from ...rays import RayCaster, passing_light
 from ..emitters import EmitterGroup
@@ -47,6 +47,9 @@ class ShadowShare:
     spread: The footprints.
     """
 
+    FIRST = 1
+    """Times as many rays a point at first."""
+
     def __init__(
         self,
         caster: RayCaster,
@@ -76,12 +79,14 @@ class ShadowShare:
         count, near, strength = len(gain), self._at.near, self._light.strength.mean()
         facing = marked(count, lambda tile: gain[tile] > 0)
         few, many = np.empty((2, count), dtype=np.int32)
+        least = self.FIRST * rays
         for tile in tiles(count):
             part = self._at.weight_of(gain[tile] * strength, tile)
-            few[tile] = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
-            many[tile] = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
+            few[tile] = power_of_two(least * np.sqrt(part / MAIN_PART), least)
+            many[tile] = power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
         self._shadow(row_numbers(facing), few, progress.part(0.0, 0.5))
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
+        many = self._many(facing, many, MORE_RAYS * rays)
         open_rows = facing & (many > few)
         partial = marked(count, lambda tile: facing[tile] & self._is_partial(tile))
         if near is not None:
@@ -101,6 +106,10 @@ class ShadowShare:
         for tile in tiles(count):
             self._lit[tile] = self._share(tile)
         return self._lit
+
+    def _many(self, _facing: Array, many: Array, _most: int) -> Array:
+        """Return (n,) how many rays follow the first where they disagree: `many`, of which `most` at most."""
+        return many
 
     def _share(self, rows: Array | slice = slice(None)) -> Array:
         total = self._total[rows]
@@ -143,10 +152,43 @@ def _shadowed(
 
     Of a tinted caster (r, 3) and (r,), and whether the rays of a row differ, (r,).
     """
-    at, chunk = spread.at, rows[part]
+    chunk = rows[part]
+    center, normal = spread.at.points[chunk], spread.at.normals[chunk]
+    unit = stratified_square(spread.at.keys[chunk], count, seed + Stream.SHADOW_RAYS)
+    aimed = light.shadow_rays(center, normal, unit)
+    start, directions, distances, weights = spread_rays(spread, light, caster, chunk, unit, aimed, seed)
+    point, sample = np.nonzero(weights > 0)
+    ray = (point, sample)
+    free = passing_light(caster, start[ray], directions[ray], distances[ray])
+    if not caster.tinted:
+        return np.bincount(point, free * weights[ray], minlength=len(chunk)), weights.sum(axis=1)
+    lit = [np.bincount(point, of * weights[ray], minlength=len(chunk)) for of in free.T]
+    low, high = np.full((len(chunk), 3), np.inf), np.zeros((len(chunk), 3))
+    np.minimum.at(low, point, free)
+    np.maximum.at(high, point, free)
+    uneven = (high - low > UNEVEN * high).any(axis=1)
+    return np.stack(lit, axis=1), weights.sum(axis=1), uneven
+
+
+def spread_rays(
+    spread: SpreadPoints,
+    light: Lamp | EmitterGroup,
+    caster: RayCaster,
+    chunk: Array,
+    unit: Array,
+    aimed: Rays,
+    seed: int,
+) -> tuple[Array, Array, Array, Array]:
+    """Spread rays that are aimed at a light from the centers of footprints over the footprints.
+
+    chunk (r,): Rows of the footprints.
+    unit (r, k, 2): What aimed the rays.
+    aimed: Directions, distances and weights.
+    Returns starts, directions (r, k, 3), distances, weights (r, k).
+    """
+    at, count = spread.at, unit.shape[1]
     center, normal = at.points[chunk], at.normals[chunk]
-    unit = stratified_square(at.keys[chunk], count, seed + Stream.SHADOW_RAYS)
-    directions, distances, weights = light.shadow_rays(center, normal, unit)
+    directions, distances, weights = aimed
     # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
     weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
     start = center[:, None]
@@ -173,17 +215,7 @@ def _shadowed(
     if at.lift is not None:
         start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
     start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
-    point, sample = np.nonzero(weights > 0)
-    ray = (point, sample)
-    free = passing_light(caster, start[ray], directions[ray], distances[ray])
-    if not caster.tinted:
-        return np.bincount(point, free * weights[ray], minlength=len(chunk)), weights.sum(axis=1)
-    lit = [np.bincount(point, of * weights[ray], minlength=len(chunk)) for of in free.T]
-    low, high = np.full((len(chunk), 3), np.inf), np.zeros((len(chunk), 3))
-    np.minimum.at(low, point, free)
-    np.maximum.at(high, point, free)
-    uneven = (high - low > UNEVEN * high).any(axis=1)
-    return np.stack(lit, axis=1), weights.sum(axis=1), uneven
+    return start, directions, distances, weights
 
 
 def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
@@ -206,7 +238,7 @@ def _mean(share: Array) -> Array:
     return share if share.ndim == 1 else np.asarray(share.mean(axis=1))
 
 
-def _power_of_two(wanted: Array, most: int) -> Array:
+def power_of_two(wanted: Array, most: int) -> Array:
     """Return (n,) int64 powers of two, at least `wanted`, from `MIN_SHADOW_RAYS` up to `most` itself."""
     exponent = np.ceil(np.log2(np.maximum(wanted, MIN_SHADOW_RAYS)))
     return np.asarray(np.minimum(2.0**exponent, most), dtype=np.int64)

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ...lights import EnvironmentLight, Lamp, Light
+from ...lights import EnvironmentLight, Lamp, LampGroup, Light
 from ...numerics import LIGHT_STEP, Array, Stream, fill_chunks, irradiance_under_sky, stratified_square
 from ...rays import RayCaster
 from .light_links import lamp_light, sky_share
@@ -51,7 +51,9 @@ def _irradiance(
             repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)
             unit = stratified_square(keys, SHADOW_RAYS, own_seed + Stream.LIGHT_RAYS)
             open_gain, share = lamp_light(light, repeated, facing, unit, caster)
-            gain = (open_gain[:, 0] * share.T).T
+            # Of many lamps each ray measures the closed form a little differently.
+            own = open_gain.mean(axis=1) if isinstance(light, LampGroup) else open_gain[:, 0]
+            gain = (own * share.T).T
         else:
             continue
         total += (gain if gain.ndim == 2 else gain[:, None]) * light.strength

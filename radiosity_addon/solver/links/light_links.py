@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...lights import EnvironmentLight, Lamp, Light, SpotLight
+from ...lights import EnvironmentLight, Lamp, LampGroup, Light, SpotLight
 from ...numerics import (
     LIGHT_STEP,
     Array,
@@ -28,6 +28,8 @@ from .transport import push
 
 LAMP_SAMPLES = 4
 """Shadow rays of each quarter of an element, each from a point of its own."""
+GROUP_SAMPLES = 16
+"""The same of many lamps together, each to one of them."""
 SKY_RAYS = 16
 """Hemisphere rays of each quarter of an element."""
 MAX_ELEMENTS_SHARE = 512
@@ -191,6 +193,8 @@ def _affordable(hierarchy: Hierarchy, elements: Array, wanted: Array, weight: Ar
 
 def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     """Return (n,) whether a lamp's pool of light may fall between the samples on elements."""
+    if isinstance(light, LampGroup):
+        return _near_any(light, hierarchy, elements)
     position = getattr(light, "position", None)
     if position is None:
         return np.zeros(len(elements), dtype=bool)
@@ -210,6 +214,25 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
         narrow, wide = light.half_angles
         near |= (off - seen < wide) & (seen > NEAR_ANGLE * narrow)
     return np.asarray(before & near)
+
+
+def _near_any(group: LampGroup, hierarchy: Hierarchy, elements: Array) -> Array:
+    """Return (n,) whether elements are too near any of many lamps."""
+    near = np.zeros(len(elements), dtype=bool)
+    corners = hierarchy.corners[elements]
+    center = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
+    for lamp in group.members:
+        place = getattr(lamp, "position", None)
+        angle = NEAR_ANGLE
+        if isinstance(lamp, SpotLight):
+            angle = min(angle, float(np.sin(NEAR_ANGLE * lamp.half_angles[0])))
+        if place is None:
+            continue
+        along = center - np.asarray(place)
+        maybe = np.flatnonzero(~near & (np.einsum("nk,nk->n", along, along) < (radius / angle) ** 2))
+        near[maybe] = too_near(lamp, hierarchy, elements[maybe])
+    return near
 
 
 def measure_light(
@@ -296,7 +319,8 @@ def _measure_lamp(
     asked: _Pieces, light: Lamp, caster: RayCaster, seed: int, divisor: int
 ) -> tuple[Array, Array]:
     """Measure a lamp on pieces of elements (see `measure_light`); whole ones have a column only."""
-    samples = LAMP_SAMPLES // divisor
+    many = isinstance(light, LampGroup)
+    samples = (GROUP_SAMPLES if many else LAMP_SAMPLES) // divisor
     unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_POINTS)
     points = points_on_triangles(asked.corners, unit)
     unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_RAYS)
@@ -306,7 +330,13 @@ def _measure_lamp(
         -1, asked.count, *share.shape[1:]
     )
     missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
-    return values, np.hypot(_largest(values.std(axis=1)), missed)
+    differ = _largest(values.std(axis=1))
+    if many:
+        # Each ray sees another lamp: expected noise of a quarter's mean is not a difference between quarters.
+        seen = share if share.ndim == 1 else share.mean(axis=1)
+        noise = mean * np.sqrt(seen * (1.0 - seen) / samples)
+        differ = np.maximum(differ - noise.reshape(-1, asked.count).mean(axis=1), 0.0)
+    return values, np.hypot(differ, missed)
 
 
 def _largest(values: Array) -> Array:
@@ -327,16 +357,25 @@ def lamp_light(
     """
     flat = points.reshape(-1, 3)
     facing = np.repeat(normals, points.shape[1], axis=0)
-    gain = light.unit_irradiance(flat, facing)
+    if isinstance(light, LampGroup):
+        # What one ray stands for is the closed form of all lamps, in the mean.
+        rays = light.rays_from(points, normals, unit)
+        gain = points.shape[1] * rays[2].ravel()
+        rows = np.flatnonzero(gain > 0)
+        directions, distances, above = rays[0].reshape(-1, 3)[rows], rays[1].ravel()[rows], gain[rows]
+    else:
+        gain = light.unit_irradiance(flat, facing)
+        rows = np.flatnonzero(gain > 0)
+        directions, distances, above = (
+            each[:, 0] for each in light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
+        )
     lamps = caster.for_lamps
     channels = (3,) if lamps.tinted else ()
     weights, passed = np.zeros(len(flat)), np.zeros((len(flat), *channels))
-    rows = np.flatnonzero(gain > 0)
-    directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
     start = flat[rows] + caster.surface_offset * facing[rows]
-    free = passing_light(lamps, start, directions[:, 0], distances[:, 0]) if light.casts_shadow else 1.0
+    free = passing_light(lamps, start, directions, distances) if light.casts_shadow else 1.0
     # A lamp point below the horizon is ignored: the closed form has clipped it already.
-    weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
+    weights[rows] = np.where(above > 0, gain[rows], 0.0)
     passed[rows] = (weights[rows].T * np.asarray(free).T).T
     shape = unit.shape[:2]
     total = weights.reshape(shape).sum(axis=1)
