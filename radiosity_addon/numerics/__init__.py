@@ -47,6 +47,7 @@ from .sampling import (
     uniform_cone,
 )
 from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
+from .short_rows import across
 from .streams import LAMP_STEP, LIGHT_STEP, SHADOW_STEP, Stream
 from .triangles import (
     WHOLE_TRIANGLE,
@@ -73,6 +74,7 @@ __all__ = [
     "Scratch",
     "Stream",
     "TriangleTree",
+    "across",
     "along_curve",
     "areas",
     "brdf_of_reflectance",

@@ -31,7 +31,7 @@ def cells_of(*others: np.ndarray) -> tuple[TexelCells, TexelGeometry]:
     geometry = texel_geometry(scene, uv, SIZE, pages)
     local = solve(scene, SolverSettings(error=1e-2)).local_pass
     crossings = find_crossings(geometry, local.caster)
-    return TexelCells(local.elements, geometry, crossings), geometry
+    return TexelCells(local.elements, geometry, crossings, np.zeros(len(geometry), bool)), geometry
 
 
 def on_floor(x: np.ndarray, y: np.ndarray) -> Hits:

@@ -21,7 +21,7 @@ from ...numerics import Array, tiles
 from ...scene import Scene
 from ...solver.gather import Footprints, LightGains, LocalPass, values_of
 from ..points import alike_neighbors
-from ..texels import SmoothLift, TexelGeometry, find_crossings, texel_materials
+from ..texels import SmoothLift, TexelGeometry, find_crossings, texel_materials, uneven_texels
 from ..transport import (
     GatherPointLayout,
     GatherSettings,
@@ -94,7 +94,7 @@ def light_texels(
         again=None if previous is None else np.flatnonzero(previous.affected.near),
         progress=progress.part(DIRECT, CROSSED),
     )
-    table = HitTable(local, geometry, crossings)
+    table = HitTable(local, geometry, crossings, uneven_texels(geometry, lamps))
     standing = None if previous is None else StandingHits(previous, table)
     part = progress.part(CROSSED, PARTS)
     transport, layout, rows = _trace(table, settings, element, reflectance, standing, so_far, part)

@@ -14,6 +14,7 @@ from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
 from .terminator import SmoothLift
 from .texel_geometry import NO_TEXEL, TexelGeometry
+from .uneven import uneven_texels
 
 __all__ = [
     "DIVIDED",
@@ -34,5 +35,6 @@ __all__ = [
     "rasterize",
     "texel_areas",
     "texel_materials",
+    "uneven_texels",
     "whole_neighbor",
 ]

@@ -57,12 +57,16 @@ _SPOTS = _FIRST + ANCHOR / ALONG
 class TexelCells:
     """The cells of some texels, numbered texel by texel.
 
-    crossings: Those have cells that are crossed or touched, or where light fades in a gap.
+    crossings: Those have cells that are crossed or touched, or where light fades in a gap, …
+    uneven (n,) bool: … and these.
     """
 
-    def __init__(self, elements: ElementLookup, geometry: TexelGeometry, crossings: Crossings) -> None:
+    def __init__(
+        self, elements: ElementLookup, geometry: TexelGeometry, crossings: Crossings, uneven: Array
+    ) -> None:
         self.elements, self._geometry = elements, geometry
-        self._rim, divided = crossings.rim, crossings.crossed | crossings.fading | crossings.touched
+        self._rim = crossings.rim
+        divided = crossings.crossed | crossings.fading | crossings.touched | uneven
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
         self._divided = divided

@@ -21,6 +21,9 @@ from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood,
 WIDE_TEXEL = 4.0
 """Texels this many times wider than the median show less detail than leaf elements that are smaller."""
 
+NEAR = 2.0
+"""Rays of up to so many widths of an uneven texel ask its cells."""
+
 TILE_HITS = 1 << 22
 """Stored hits that are counted or numbered at once; bounds the temporaries to about 60 MB."""
 
@@ -28,20 +31,25 @@ TILE_HITS = 1 << 22
 class HitTable:
     """Numbers hits of one scene, and finds what the numbers stand for.
 
+    uneven (n,) bool: Texels over which direct light changes: short rays ask its cells.
+
     texel_count, first_small, first_cell, end: Where elements, their smaller cells, and cells of texels begin,
         and where all numbers end.
     """
 
-    def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
+    def __init__(
+        self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings, uneven: Array
+    ) -> None:
         self.local, self.geometry, self.crossings = local, geometry, crossings
         elements = local.elements
         self.element_cells = ElementCells(elements.hierarchy, elements.caster, geometry.texel_size)
-        self.texel_cells = TexelCells(local.elements, geometry, crossings)
+        self.texel_cells = TexelCells(local.elements, geometry, crossings, uneven)
         self.texel_count = len(geometry)
         self.first_small = self.texel_count + local.elements.hierarchy.n_elements
         self.first_cell = self.texel_count + len(self.element_cells)
         self.end = self.first_cell + len(self.texel_cells)
-        self._in_cells = crossings.crossed | crossings.fading
+        self._in_cells, self._uneven = crossings.crossed | crossings.fading, uneven
+        self._near = NEAR * np.sqrt(geometry.texel_area)
         self._wide = geometry.texel_area > (WIDE_TEXEL * geometry.texel_size) ** 2
 
     def number(self, hits: Hits) -> Array:
@@ -49,13 +57,20 @@ class HitTable:
         geometry, elements = self.geometry, self.local.elements
         texel = geometry.texel_at(hits)
         found = texel.copy()
-        divided = np.flatnonzero((texel != NO_TEXEL) & self._in_cells[texel])
+        there = texel != NO_TEXEL
+        divided = np.flatnonzero(there & self._in_cells[texel])
         # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
-        touched = np.flatnonzero((texel != NO_TEXEL) & self.crossings.touched[texel])
+        touched = np.flatnonzero(there & self.crossings.touched[texel])
         apart = touched[~self._sees_center(texel[touched], hits.take(touched))]
         divided = np.concatenate([divided, apart])
         cell = self.texel_cells.at(texel[divided], hits.take(divided))
         found[divided] = cell + self.first_cell
+        # From close by it matters which part of the texel is lit.
+        near = there & self._uneven[texel] & (hits.distance < self._near[hits.triangle])
+        near[divided] = False
+        close = np.flatnonzero(near)
+        part = self.texel_cells.at(texel[close], hits.take(close))
+        found[close] = np.where(part == NOTHING, texel[close], part + self.first_cell)
         without = divided[cell == NOTHING]
         found[without] = self._neighbor(texel[without], hits.take(without))
         large = np.flatnonzero((found >= 0) & self._wide[hits.triangle])
@@ -128,10 +143,20 @@ class HitTable:
             return replace(self.element_cells.footprints(cell), expected=expected)
         return self.texel_cells.lit(self.texel_cell(number))
 
-    def gather(self, number: Array, of_element: bool, rays: int, progress: Progress = SILENT) -> GatheredHits:
-        """Gather over cells of elements, or of texels; sources are numbers of hits."""
+    def gather(
+        self,
+        number: Array,
+        of_element: bool,
+        rays: int,
+        into: tuple[Array, Array | None] | None = None,
+        progress: Progress = SILENT,
+    ) -> GatheredHits:
+        """Gather over cells of elements, or of texels; sources are numbers of hits.
+
+        into (p, rays) int32, and (p, rays, 3) float16 or None: Takes the sources and tints, if given.
+        """
         at, surface_normals = self.footprints(number, of_element)
-        return self.local.gather.at(at, surface_normals, rays, self.number, progress=progress)
+        return self.local.gather.at(at, surface_normals, rays, self.number, into=into, progress=progress)
 
 
 class TableRows:

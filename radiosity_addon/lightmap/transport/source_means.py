@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, Scratch, fill_chunks, map_chunks, tiles
+from ...numerics import Array, Scratch, across, fill_chunks, map_chunks, tiles
 
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
@@ -43,6 +44,14 @@ class SourceMeans:
 
         changed (table rows,) bool: Which rows changed since the last call; the first call asks all.
         """
+        for _ in self.renewed(table, changed, progress):
+            pass
+        return self._mean
+
+    def renewed(
+        self, table: Array, changed: Array, progress: Progress = SILENT
+    ) -> Iterator[tuple[Array | slice, Array]]:
+        """Compute the means again that may have changed; yield their rows, and (r, channels) means."""
         columns = _columns(table)
         # Where much changed every row sees some of it: to look for those that do not takes as long.
         refresh_all = not self._known or float(changed.mean()) > MANY_CHANGED
@@ -50,12 +59,14 @@ class SourceMeans:
         if refresh_all:
             average = partial(_mean_of_rows, columns, self._sources, self._tints)
             fill_chunks(average, self._mean, len(self._sources), chunk, self._threads, progress)
+            self._known = True
+            for tile in tiles(len(self._mean)):
+                yield tile, self._mean[tile]
         elif changed.any():
             renew = partial(_changed_means, columns, self._sources, self._tints, changed)
             for _, (rows, means) in map_chunks(renew, len(self._sources), chunk, self._threads, progress):
                 self._mean[rows] = means
-        self._known = True
-        return self._mean
+                yield rows, means
 
 
 def by_channel(count: int, channels: int, scratch: Scratch | None = None) -> Array:
@@ -93,7 +104,8 @@ def _changed_means(
     columns: list[Array], sources: Array, tints: Array | None, changed: Array, rows: slice
 ) -> tuple[Array, Array]:
     """Return the rows that see something changed, and their means."""
-    again = rows.start + np.flatnonzero(changed.take(sources[rows], mode="wrap").any(axis=1))
+    seen = across(np.logical_or, changed.take(sources[rows], mode="wrap"))
+    again = rows.start + np.flatnonzero(seen)
     return again, _mean_of(columns, sources[again], None if tints is None else tints[again])
 
 
@@ -106,7 +118,8 @@ def _mean_of(columns: list[Array], sources: Array, tints: Array | None) -> Array
     """Return (r, channels) means over the columns' values at (r, rays) sources, times (r, rays, channels)."""
     # "wrap" lets negative numbers count from the end.
     seen = sources.astype(np.intp)
-    if tints is None:
-        return np.stack([column.take(seen, mode="wrap").mean(axis=1) for column in columns], axis=1)
-    found = np.stack([column.take(seen, mode="wrap") for column in columns], axis=2)
-    return np.asarray((found * tints).mean(axis=1))
+    found = [column.take(seen, mode="wrap") for column in columns]
+    if tints is not None:
+        found = [values * tints[..., channel] for channel, values in enumerate(found)]
+    rays = np.float32(seen.shape[1])
+    return np.stack([across(np.add, values) / rays for values in found], axis=1)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, marked, tiles
+from ...numerics import Array, Scratch, across, marked, tiles
 from ...solver.gather import LightGains, values_of
 from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
@@ -22,6 +22,9 @@ from .source_means import SourceMeans
 RAYS_OF_MET = ((1, 4), (8, 16), (32, 64))
 """A cell that so many rays met, or more, gathers with so many of its own. Were m rays that met it all of one
 point's n, a cell of r rays would add m² / (n r) of the point's own variance to it."""
+
+MOST_MET = 255
+"""Rays that met a cell, beyond which it makes no difference how many: what a byte holds."""
 
 RAYS_PER_SHADOW_RAY = 4
 """Gather rays of a cell for each shadow ray to a lamp."""
@@ -156,7 +159,10 @@ def gather_sub_cells(
         rows.to_rows(sources)
     number = np.concatenate([np.arange(table.texel_count, table.first_small), small])
     element = table.elements_of(number, below)
-    return SubCells(values_of(table.local.elements.reflected(), element), made, element), rows
+    start, reflected = table.geometry.scratch.empty((len(element), 3)), table.local.elements.reflected()
+    for tile in tiles(len(element)):
+        start[tile] = values_of(reflected, element[tile])
+    return SubCells(start, made, element), rows
 
 
 class _SubCellGather:
@@ -164,9 +170,11 @@ class _SubCellGather:
 
     def __init__(self, table: HitTable, most_rays: int, known: Sequence[SubCellHits] = ()) -> None:
         self._table, self._first, self._most_rays = table, table.texel_count, most_rays
-        self._met = np.zeros(table.end - self._first, dtype=np.int32)
+        self._scratch = table.geometry.scratch
+        self._met = np.zeros(table.end - self._first, dtype=np.uint8)
+        """Of every number how often it was met, up to `MOST_MET`."""
         self._gathered = np.zeros(len(self._met), dtype=bool)
-        self._found: list[SubCellHits] = []
+        self._found: dict[tuple[bool, int], _FoundCells] = {}
         self._known = [(hits, np.zeros(len(hits.number), dtype=bool)) for hits in known]
 
     def count(self, sources: Array) -> None:
@@ -175,7 +183,7 @@ class _SubCellGather:
             number = sources[tile]
             # Few of all cells are met by a tile: sums over all of them would take longer than to sort it.
             cells, met = np.unique(number[number >= self._first] - self._first, return_counts=True)
-            self._met[cells] += met.astype(np.int32)
+            self._met[cells] = np.minimum(self._met[cells] + met, MOST_MET)
 
     def take_known(self) -> None:
         """Take the known cells that were met, and those that these met in turn.
@@ -204,12 +212,13 @@ class _SubCellGather:
             for of_element in (True, False)
             for own, (_, rays) in enumerate(RAYS_OF_MET)
         ]
-        for (of_element, rays, cells), part in progress.each(groups):
+        for (of_element, wanted, cells), part in progress.each(groups):
+            rays = min(wanted, self._most_rays)
             for tile, of_tile in part.each(list(tiles(len(cells)))):
-                chosen = cells[tile]
-                gathered = self._table.gather(chosen, of_element, min(rays, self._most_rays), of_tile)
-                self.count(gathered.sources)
-                self._found.append(SubCellHits(of_element, chosen, gathered.sources, tints=gathered.tints))
+                found = self._found.get((of_element, rays))
+                if found is None:
+                    found = self._found[of_element, rays] = _FoundCells(self._table, of_element, rays)
+                self.count(found.gather(cells[tile], of_tile))
         return len(new) > 0
 
     def small(self) -> Array:
@@ -226,16 +235,17 @@ class _SubCellGather:
         """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""
         table = self._table
         gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any())]
-        gathered += SubCellHits.joined(self._found)
-        # Both are copies: of what was found, and of what stays.
-        self._found = []
+        gathered += [found.all() for found in self._found.values()]
+        self._found = {}
         made = []
         for hits, part in progress.each(gathered):
             if hits.gains is None:
                 gains, lamps = self._lit(hits, part)
             else:
                 gains, lamps = hits.gains, table.local.direct.lit_by(hits.gains)
-            of_cells = table.reflectance(hits.number, hits.of_element, reflectance)
+            of_cells = self._scratch.empty((len(hits.number), 3))
+            for tile in tiles(len(of_cells)):
+                of_cells[tile] = table.reflectance(hits.number[tile], hits.of_element, reflectance)
             rows.to_rows(hits.sources)
             made.append(
                 SubCellLinks(rows.rows(hits.number), hits.sources, of_cells, lamps, gains, hits.tints)
@@ -244,7 +254,7 @@ class _SubCellGather:
 
     def _lit(self, hits: SubCellHits, progress: Progress) -> tuple[LightGains | None, Array]:
         """Return what each light adds to cells, if it is kept, and (p, 3) what all add [W/m²]."""
-        direct, lamps = self._table.local.direct, np.empty((len(hits.number), 3))
+        direct, lamps = self._table.local.direct, self._scratch.empty((len(hits.number), 3))
         kept = []
         for tile, part in progress.each(list(tiles(len(lamps)))):
             gains = direct.new_gains(len(lamps[tile]))
@@ -255,6 +265,32 @@ class _SubCellGather:
         return LightGains.joined(kept) if kept else None, lamps
 
 
+class _FoundCells:
+    """Cells of one kind that gather, as many at a time as fit."""
+
+    def __init__(self, table: HitTable, of_element: bool, rays: int) -> None:
+        self._table, self._of_element, self._rays = table, of_element, rays
+        scratch = table.geometry.scratch
+        self._numbers: list[Array] = []
+        self._sources = scratch.rows(rays, np.int32)
+        self._tints = scratch.rows(3 * rays, np.float16) if table.local.caster.tinted else None
+
+    def gather(self, number: Array, progress: Progress) -> Array:
+        """Gather from further cells; return (p, rays) int32 the numbers of what they hit."""
+        sources, tints = self._sources.more(len(number)), None
+        if self._tints is not None:
+            tints = self._tints.more(len(number)).reshape(len(number), self._rays, 3)
+        self._table.gather(number, self._of_element, self._rays, (sources, tints), progress)
+        self._numbers.append(number)
+        return sources
+
+    def all(self) -> SubCellHits:
+        """Return all that gathered."""
+        number, sources = np.concatenate(self._numbers), self._sources.all()
+        tints = None if self._tints is None else self._tints.all().reshape(*sources.shape, 3)
+        return SubCellHits(self._of_element, number, sources, tints=tints)
+
+
 class SubCellSweeps:
     """Updates the cells' rows of a table of reflected radiosity.
 
@@ -262,13 +298,18 @@ class SubCellSweeps:
     ----------
     cells : SubCells
     texel_count, threads : int
+    scratch : Scratch or None
+        Makes the cells' arrays; None keeps them in memory.
     """
 
-    def __init__(self, cells: SubCells, texel_count: int, threads: int) -> None:
+    def __init__(
+        self, cells: SubCells, texel_count: int, threads: int, scratch: Scratch | None = None
+    ) -> None:
         self._links, self._surfaces = cells.links, texel_count + len(cells.start)
         self._texel_count = texel_count
         self._means = [
-            SourceMeans(links.sources, links.lamps.shape[1], threads, links.tints) for links in cells.links
+            SourceMeans(links.sources, links.lamps.shape[1], threads, links.tints, scratch)
+            for links in cells.links
         ]
         self._unseen: Array | None = None
 
@@ -277,7 +318,8 @@ class SubCellSweeps:
         lit = np.ones(self._surfaces, dtype=bool)
         lit[: self._texel_count] = marked(self._texel_count, lambda rows: direct[rows].any(axis=1))
         for links in self._links:
-            lit[links.rows] = links.lamps.any(axis=1)
+            for tile in tiles(len(links.rows)):
+                lit[links.rows[tile]] = across(np.logical_or, links.lamps[tile])
         return lit
 
     def reach(self, reached: Array) -> bool:
@@ -285,9 +327,13 @@ class SubCellSweeps:
         more = False
         for links in self._links:
             dark = np.flatnonzero(~reached[links.rows])
-            seen = dark[reached[links.sources[dark]].any(axis=1)]
-            reached[links.rows[seen]] = True
-            more |= len(seen) > 0
+            seen = [
+                dark[tile][across(np.logical_or, reached[links.sources[dark[tile]]])]
+                for tile in tiles(len(dark))
+            ]
+            for rows in seen:
+                reached[links.rows[rows]] = True
+                more |= len(rows) > 0
         return more
 
     def sweep(self, table: Array, changed: Array, still: float) -> None:
@@ -304,11 +350,12 @@ class SubCellSweeps:
         for _ in range(SWEEPS):
             news = []
             for links, means in zip(self._links, self._means, strict=True):
-                irradiance = links.lamps + means.of(table, fresh)
-                reflected = (links.reflectance * irradiance).astype(np.float32)
-                moved = np.abs(reflected - table[links.rows]).max(axis=1) > still
-                if moved.any():
-                    news.append((links.rows[moved], reflected[moved]))
+                for own, mean in means.renewed(table, fresh):
+                    rows = links.rows[own]
+                    reflected = (links.reflectance[own] * (links.lamps[own] + mean)).astype(np.float32)
+                    moved = across(np.maximum, np.abs(reflected - table[rows])) > still
+                    if moved.any():
+                        news.append((rows[moved], reflected[moved]))
             fresh[:] = False
             for rows, values in news:
                 table[rows] = values

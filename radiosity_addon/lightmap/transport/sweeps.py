@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, Scratch, row_numbers, tiles, trim
+from ...numerics import Array, Scratch, across, row_numbers, tiles, trim
 from ...solver.gather import LightGains
 from ..points import Smoothing, choose_smoothing, columns
 from ..texels import TexelGeometry
@@ -166,7 +166,7 @@ def sweep(
         Makes the texels' arrays; None keeps them in memory.
     """
     links, reflectance, texel_count = transport.links, transport.reflectance, len(lamps)
-    cells = SubCellSweeps(transport.cells, texel_count, threads)
+    cells = SubCellSweeps(transport.cells, texel_count, threads, scratch)
     # Columns lie one after the other in memory.
     surfaces = texel_count + len(transport.cells.start)
     table = np.zeros((surfaces + len(beyond), 3), dtype=np.float32, order="F")
@@ -207,7 +207,7 @@ def sweep(
         for rows in tiles(texel_count):
             indirect[rows] = np.maximum(indirect[rows], 0.0)
             radiosity = (reflectance[rows] * (direct[rows] + indirect[rows])).astype(np.float32)
-            change = np.abs(radiosity - table[rows]).max(axis=1)
+            change = across(np.maximum, np.abs(radiosity - table[rows]))
             moved = change > still
             changed[rows] = moved
             table[rows][moved] = radiosity[moved]

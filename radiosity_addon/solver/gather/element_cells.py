@@ -30,7 +30,13 @@ MAX_DEPTH = 3
 """How many times a large leaf is cut into sixteenths."""
 
 FINE = 3.0
-"""What is not wider than this many texels answers as a whole."""
+"""What is not wider than this many texels answers as a whole, …"""
+
+FINEST = 0.75
+"""… but for rays that are shorter than a part of its width: those ask cells down to this width, …"""
+
+NEAR = 0.5
+"""… which is this part."""
 
 HOOD = 0.25
 """What is nearer above a large leaf than this part of a texel's width hoods it."""
@@ -61,8 +67,8 @@ class ElementCells:
     def __init__(self, hierarchy: Hierarchy, caster: RayCaster, finest: float = np.inf) -> None:
         self._hierarchy, self._caster, self._finest = hierarchy, caster, finest
         self._size = np.sqrt(hierarchy.area[: hierarchy.n_elements])
-        depth = 1 + sum((self._size > FINE * finest * _cells(level)).astype(np.int8) for level in (1, 2))
-        self._depth = np.asarray(depth)
+        self._depth = self._levels(FINEST)
+        self._enough = self._levels(FINE)
         counts = np.array([_STARTS[level] for level in range(1, MAX_DEPTH + 1)])
         ends = hierarchy.n_elements + np.cumsum(counts[self._depth - 1])
         self._first = np.concatenate([[hierarchy.n_elements], ends])
@@ -94,7 +100,11 @@ class ElementCells:
         hits, leaf = hits.take(rows), leaf[rows]
         normal = self._hierarchy.normal_of(leaf)
         position = self._positions(hits) + self._lift(normal)
-        level = np.where(self._is_large(leaf), self._depth[leaf], 0)
+        large = self._is_large(leaf)
+        level = np.where(large, self._enough[leaf], 0)
+        # What is close to a ray's start is as wide for it as many texels are from afar.
+        near = large & (hits.distance < NEAR * self._size[leaf] / 4.0**level)
+        level[near] = self._depth[leaf[near]]
         whole = np.flatnonzero(level == 0)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
         level[whole[~free_segment(self._caster, position[whole], anchor)]] = 1
@@ -121,6 +131,11 @@ class ElementCells:
         """Return (l, 3) twice: the corners of the boxes around leaves."""
         corners = self._hierarchy.corners[leaf]
         return corners.min(axis=1), corners.max(axis=1)
+
+    def _levels(self, texels: float) -> Array:
+        """Return (e,) int8: how many times leaves are cut until their cells are so many texels wide."""
+        levels = [self._size > texels * self._finest * 4**level for level in range(1, MAX_DEPTH)]
+        return np.asarray(1 + sum(wider.astype(np.int8) for wider in levels))
 
     def _is_large(self, leaf: Array) -> Array:
         """Return (l,) bool: leaves of which texels would show more."""
@@ -212,11 +227,6 @@ class ElementCells:
 
     def _lift(self, normal: Array) -> Array:
         return np.asarray(SIGHT_LIFT * self._caster.surface_offset * normal)
-
-
-def _cells(level: int) -> int:
-    """Return how many cells of a level lie along a leaf's side."""
-    return 4**level
 
 
 _STARTS = [sum(CELLS_PER_ELEMENT**level for level in range(1, depth + 1)) for depth in range(MAX_DEPTH + 1)]
