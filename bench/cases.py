@@ -24,6 +24,9 @@ ERROR_SETTING = next(
 )
 """The field of the target error, where this version has it."""
 
+CONTENTS = 2
+"""Version of what a prepared case's folder holds."""
+
 ASKED_ERRORS = (0.05, 0.03, 0.02, 0.01)
 
 
@@ -105,7 +108,7 @@ class Case:
             digest.update(ast.dump(ast.parse(source.read_text(encoding="utf-8"))).encode())
         if self.file is not None:
             digest.update(str(self.file.stat().st_size).encode())
-        about = [self.resolution, self.parameters, self.path, self.sky, blender_version()]
+        about = [CONTENTS, self.resolution, self.parameters, self.path, self.sky, blender_version()]
         about.append(
             None
             if self.lamp is None

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import curves, processes
 from .cases import ERROR_SETTING, Case, label, with_asked_errors
-from .error_measure import block_error, error_figures
+from .error_measure import block_error, error_figures, relative_rmse
 
 MAX_BUSY = 0.2
 """Cores that may be busy elsewhere before times are doubted."""
@@ -64,11 +64,12 @@ class Bench:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A case's folder in the cache, the compared texels, and two references."""
+    """A case's folder in the cache, the compared texels, those on coincident faces, and two references."""
 
     case: Case
     folder: Path
     compared: np.ndarray
+    coincident: np.ndarray
     triangles: int
     first: np.ndarray
     second: np.ndarray
@@ -86,6 +87,8 @@ class Prepared:
     def judged(self, pixels: np.ndarray) -> dict[str, float]:
         at = self.compared
         figures = error_figures(pixels[at], self.first[at], self.second[at])
+        apart = at & ~self.coincident
+        figures["without_coincident"] = relative_rmse(pixels[apart], self.first[apart], self.second[apart])
         return {**figures, "block_error": block_error(pixels, self.first, self.second, at)}
 
 
@@ -113,7 +116,8 @@ def prepare(bench: Bench, case: Case) -> Prepared:
             say(f"{case.name}: reference {seed} took {figures['seconds']:.0f} s")
         references.append(np.load(folder / name))
     with np.load(texels) as file:
-        return Prepared(case, folder, file["compared"], int(file["triangles"]), *references)
+        masks = file["compared"], file["coincident"]
+        return Prepared(case, folder, *masks, int(file["triangles"]), *references)
 
 
 def compare(bench: Bench, case: Case) -> dict[str, Any]:

@@ -13,7 +13,9 @@ from radiosity_addon.blender.files.files import empty_scene, open_scene
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.lightmap.texels.rasterization import rasterize
 from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
+from radiosity_addon.scene.scene import Scene
 from tests.golden import cornell_reference
 
 from . import cycles
@@ -26,6 +28,9 @@ from .layout import lay_out, write_layout
 INTERIORS = {"interior": build_office, "living-room": build_living_room, "apartment": build_apartment}
 
 SCENE, TEXELS = "scene.blend", "texels.npz"
+
+COINCIDENT = 1e-3
+"""Faces so near each other are coincident: Cycles bakes them black, or lit through each other [m]."""
 
 
 def case_of(job: dict[str, Any]) -> Case:
@@ -47,15 +52,15 @@ def prepare(job: dict[str, Any]) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), compress=True)
-    triangle, uv = _center_inside(case)
+    inside, coincident, uv = _center_inside(case)
     scene = bpy.context.scene
     cycles.set_up(scene, job["threads"])
-    compared = (triangle >= 0) & cycles.covered(scene, case.resolution)
+    compared = inside & cycles.covered(scene, case.resolution)
     if golden is not None:
         for seed, pixels in enumerate((golden.first, golden.second), start=1):
             np.save(reference_path(folder, 2048, seed), pixels)
     # Last: that it is there means that all is.
-    np.savez_compressed(folder / TEXELS, compared=compared, triangle=triangle, triangles=len(uv))
+    np.savez_compressed(folder / TEXELS, compared=compared, coincident=coincident, triangles=len(uv))
     return {"texels": int(compared.sum()), "triangles": len(uv)}
 
 
@@ -86,17 +91,33 @@ def _add_lamp(lamp: Lamp) -> None:
     bpy.context.scene.collection.objects.link(obj)
 
 
-def _center_inside(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, n) the reflecting triangle over a texel's center, −1 for none; and the triangles' UVs."""
+def _center_inside(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the texels whose center is on a reflecting triangle, those on coincident faces, and UVs.
+
+    (n, n) bool twice, and (t, 3, 2).
+    """
     scene = export_scene(bpy.context, BakeSettings(resolution=case.resolution, keep_uvs=True)).bake_scene
     uv = np.concatenate(
         [np.zeros((item.count, 3, 2), np.float32) if item.uv is None else item.uv for item in scene.objects]
     )
     texels = rasterize(uv, case.resolution)
-    inside = texels.center_inside & (scene.scene.reflectance[texels.triangle].min(axis=1) > 0)
-    triangle = np.full((case.resolution, case.resolution), -1, dtype=np.int32)
-    triangle[texels.row[inside], texels.column[inside]] = texels.triangle[inside]
-    return triangle, uv
+    inside, coincident = np.zeros((2, case.resolution, case.resolution), dtype=bool)
+    own = texels.center_inside & (scene.scene.reflectance[texels.triangle].min(axis=1) > 0)
+    inside[texels.row[own], texels.column[own]] = True
+    against = _lies_against(scene.scene, texels.triangle, texels.centroid)
+    coincident[texels.row[against], texels.column[against]] = True
+    return inside, coincident, uv
+
+
+def _lies_against(scene: Scene, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return (n,) whether another triangle is next to points, at (n, 3) weights of their own triangles."""
+    point = np.einsum("nc,nck->nk", weights, scene.triangles[triangle])
+    normal, caster = scene.face_normals[triangle], EmbreeCaster(scene.triangles)
+    found = np.zeros(len(point), dtype=bool)
+    for side in (normal, -normal):
+        hits = caster.intersect(point + COINCIDENT * side, -side)
+        found |= (hits.triangle != triangle) & (hits.distance < 2.0 * COINCIDENT)
+    return found
 
 
 def open_prepared(folder: Path) -> bpy.types.Scene:
