@@ -97,7 +97,8 @@ def _qualities_table(compared: list[dict[str, Any]]) -> str:
                 continue
             oidn, apart = times["ratio_to_cycles_oidn"], _percent(error.get("without_coincident"))
             lines.append(
-                f"| {scene} | {row['label']} | {row['error']:.1%} | {apart} | {error['without_worst_1']:.1%} | "
+                f"| {scene} | {row['label']} | {row['error']:.1%} | {apart} | "
+                f"{error['without_worst_1']:.1%} | "
                 f"{_time({'seconds': times['seconds'], 'kind': 'measured'})} | "
                 f"{_times(times['ratio_to_cycles'])} | {'not reached' if oidn is None else _times(oidn)} |"
             )

@@ -225,8 +225,7 @@ def test_a_bake_that_cannot_be_published_leaves_what_is_shown(
     third = bpy.data.scenes.new("Third")
     for obj in box.objects:
         third.collection.objects.link(obj)
-    third.radiosity.resolution = box.radiosity.resolution
-    third.radiosity.quality = box.radiosity.quality
+    third.radiosity.resolution, third.radiosity.quality = box.radiosity.resolution, box.radiosity.quality
     fourth = bpy.data.scenes.new("Fourth")
 
     def state() -> list[object]:
@@ -234,10 +233,7 @@ def test_a_bake_that_cannot_be_published_leaves_what_is_shown(
         trees = [tree for tree in bpy.data.node_groups if tree.name.startswith(GROUP_NAME)]
         results = [(tree.name, node) for tree in trees for node in tree.nodes if node.type == "GROUP_OUTPUT"]
         return [
-            [
-                scene.is_property_set("radiosity") and scene.radiosity.is_property_set("show")
-                for scene in scenes
-            ],
+            [s.is_property_set("radiosity") and s.radiosity.is_property_set("show") for s in scenes],
             [look_of(scene) for scene in scenes],
             [(name, node.inputs[0].links[0].from_node.name) for name, node in results],
         ]
