@@ -49,7 +49,6 @@ class HitTable:
         self.first_cell = self.texel_count + len(self.element_cells)
         self.end = self.first_cell + len(self.texel_cells)
         self._in_cells, self._uneven = crossings.crossed | crossings.fading, uneven
-        self._near = NEAR * np.sqrt(geometry.texel_area)
         self._wide = geometry.texel_area > (WIDE_TEXEL * geometry.texel_size) ** 2
 
     def number(self, hits: Hits) -> Array:
@@ -66,7 +65,8 @@ class HitTable:
         cell = self.texel_cells.at(texel[divided], hits.take(divided))
         found[divided] = cell + self.first_cell
         # From close by it matters which part of the texel is lit.
-        near = there & self._uneven[texel] & (hits.distance < self._near[hits.triangle])
+        near = there & self._uneven[texel]
+        near[near] = hits.distance[near] ** 2 < NEAR**2 * geometry.texel_area[hits.triangle[near]]
         near[divided] = False
         close = np.flatnonzero(near)
         part = self.texel_cells.at(texel[close], hits.take(close))
