@@ -103,6 +103,23 @@ def test_roughness_and_metal_are_exported_as_they_are(baked: Path) -> None:
     assert written["images"][source]["name"] == "Worn"
 
 
+def test_what_is_exported_stands_where_it_was_baked(baked: Path) -> None:
+    """At the frame that is shown, and though viewports hide it."""
+    scene, plane, other = bpy.context.scene, bpy.data.objects["Plane"], bpy.data.objects["Other"]
+    for frame, height in ((0, 0.0), (20, 2.0)):
+        plane.location.z = height
+        plane.keyframe_insert("location", frame=frame)
+    other.hide_viewport = True
+    scene.frame_set(20)
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    written = Glb.of_bytes((export_folder(bpy.context) / "scene.glb").read_bytes())
+    places = {node["name"]: node.get("translation") for node in written.json["nodes"]}
+    np.testing.assert_allclose(places["Plane"], (0, 2, 0), atol=1e-6)
+    np.testing.assert_allclose(places["Other"], (3, 0, 0), atol=1e-6)
+    assert scene.frame_current == 20
+    assert other.hide_viewport
+
+
 def test_an_export_of_other_lightmaps_is_outdated(baked: Path) -> None:
     assert not is_export_outdated(bpy.context)
     assert bpy.ops.radiosity.export() == {"FINISHED"}

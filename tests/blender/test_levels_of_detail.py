@@ -195,6 +195,19 @@ def test_an_edited_level_is_baked_again_with_its_finest(room: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("moved", [("Rock_LOD1",), ("Rock_LOD0", "Rock_LOD1")])
+def test_moved_levels_are_updated_in_a_bake_that_is_kept(room: Path, moved: tuple[str, ...]) -> None:
+    """Coarser levels have no triangles in the scene that is solved: what moved of them is empty."""
+    for name, segments in (("Rock_LOD0", 24), ("Rock_LOD1", 8)):
+        add_sphere(name, segments, (0, 0, 0.8))
+    assert bake() == {"FINISHED"}
+    before = lightmap()
+    for name in moved:
+        bpy.data.objects[name].location.x += 0.4
+    assert bake() == {"FINISHED"}
+    assert (np.abs(lightmap() - before).max() > 0.1) == ("Rock_LOD0" in moved)
+
+
 def test_levels_are_exported_with_the_lightmap_of_the_finest(room: Path) -> None:
     add_plane("Shelf_LOD0", 4)
     add_plane("Shelf_LOD1", 1).location = Vector((0, 0, 0.5))

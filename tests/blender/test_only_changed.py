@@ -305,3 +305,26 @@ def test_an_export_names_what_was_edited_since(room: Path, capfd: pytest.Capture
     bpy.context.scene.radiosity.scope = "all"
     assert bake() == {"FINISHED"}
     assert "since the last bake" not in said()
+
+
+def test_an_export_leaves_textures_alone_that_were_not_edited(
+    room: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """They are looked at as finely as the bake did, whatever the panel says now."""
+    rug = add_mesh("Rug", location=(0.5, 0.5, 0.1), scale=(0.3, 0.3, 1))
+    rug.data.uv_layers.new(name="UVMap")
+    material = shader_material("Woven", "ShaderNodeBsdfDiffuse")
+    image = bpy.data.images.new("Weave", 64, 64)
+    image.pixels = np.random.default_rng(2).random(4 * 64 * 64).astype(np.float32)
+    image.pack()
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_DIFFUSE")
+    material.node_tree.links.new(node.outputs["Color"], shader.inputs["Color"])
+    rug.data.materials.append(material)
+    bpy.context.scene.radiosity.scope = "all"
+    assert bake() == {"FINISHED"}
+    bpy.context.scene.radiosity.resolution = 64
+    capfd.readouterr()
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert "since the last bake" not in capfd.readouterr().out

@@ -106,7 +106,8 @@ def drawn(export: Path, program: Path, width: int, height: int, finer: int = 1, 
     """
     width, height = finer * width, finer * height
     server = Server(export, program)
-    with tempfile.TemporaryDirectory() as profile:
+    # Helpers of Chromium may still write while the folder is removed.
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         query = urlencode({**asked, "width": width, "height": height})
         command = [chromium(), *OPTIONS, f"--user-data-dir={profile}", f"{server.address}?{query}"]
         browser = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -125,7 +126,10 @@ def drawn(export: Path, program: Path, width: int, height: int, finer: int = 1, 
 @contextmanager
 def viewer(page: Path, width: int = 1000, height: int = 700) -> Iterator[Viewer]:
     """Open a viewer from the disk, and yield it once it has loaded its scene."""
-    with tempfile.TemporaryDirectory() as profile, Remote(profile, width, height) as browser:
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
+        Remote(profile, width, height) as browser,
+    ):
         shown = Viewer(browser, browser.opened(page.resolve().as_uri()))
         until = time.monotonic() + WAIT
         while shown.evaluated("typeof viewer") != "object":

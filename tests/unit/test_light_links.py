@@ -18,8 +18,8 @@ from radiosity_addon.solver.links.light_links import (
     link_lights,
     measure_light,
     no_light_links,
-    sky_share,
 )
+from radiosity_addon.solver.links.light_samples import sky_share
 from radiosity_addon.solver.links.transport import push
 from tests.rooms import box_room, gray_scene, rectangle, solid_box
 

@@ -32,8 +32,13 @@ def shown_bake(scene: bpy.types.Scene, export: Export) -> ShownBake | None:
     return ShownBake(lightmaps, json.loads(scene.radiosity.baked_objects or "{}"))
 
 
-def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, digests: BakeDigests) -> None:
-    """Note on every object what it was baked as, and on the scene which objects there were."""
+def remember(
+    scene: bpy.types.Scene, export: Export, result: BakeResult, digests: BakeDigests, resolution: int
+) -> None:
+    """Note on every object what it was baked as, and on the scene which objects there were.
+
+    resolution: Of the bake's settings, by which textures are read.
+    """
     sources = {
         target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     }
@@ -49,3 +54,4 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, digests
     scene.radiosity.baked_light = digests.light
     short = {name: digest[:SHORT] for name, digest in digests.objects.items()}
     scene.radiosity.baked_objects = json.dumps(short)
+    scene.radiosity.baked_resolution = resolution

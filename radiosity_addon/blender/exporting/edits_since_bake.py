@@ -24,9 +24,11 @@ def edits_since_bake(
     Yields fraction: As `export_steps`.
     """
     objects = json.loads(context.scene.radiosity.baked_objects or "{}")
-    if not objects:
+    # A bake of an earlier version does not say how finely it looked at textures.
+    resolution = context.scene.radiosity.baked_resolution
+    if not objects or not resolution:
         return []
-    settings = BakeSettings()
+    settings = BakeSettings(resolution=resolution)
     shown = Originals(context)
     try:
         export = yield from export_steps(context, settings, False, in_background, shown)

@@ -193,6 +193,9 @@ def _gltf(context: bpy.types.Context, scene: ExportScene, folder: Path, *, keeps
                 export_cameras=True,
                 export_lights=keeps_lamps,
                 export_animations=False,
+                # Lightmaps show the light of this frame and pose.
+                export_current_frame=True,
+                export_rest_position_armature=False,
                 export_import_convert_lighting_mode="SPEC",
             )
         written = path.read_bytes()

@@ -121,6 +121,7 @@ class _Copies:
             copy = obj.copy()
             made.made.append(copy)
             copy.name = f"{PREFIX}{number}"
+            copy.hide_viewport = False  # renders show it, and only what viewports show is evaluated
             self._nodes[copy.name] = obj.name_full
             made.objects[obj.name_full] = copy
             if copy.instance_type == "COLLECTION":  # what it shows was not baked, or has stand-ins

@@ -48,7 +48,7 @@ WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
 
 _MEMORY = {
-    "radiosity": ("last_bake", "baked_light", "baked_objects"),
+    "radiosity": ("last_bake", "baked_light", "baked_objects", "baked_resolution"),
     "radiosity_relight": ("mark", "strengths"),
 }
 """What a scene remembers of its bake, by property group."""
@@ -133,7 +133,7 @@ def finish(
             result = replace(result, warnings=(*warnings, *result.warnings))
         # A copy remembers its bake too; the time that is left to do is not in its figures.
         report = _report(result, images, groups, settings, seconds)
-        remember(scene, export, result, digests)
+        remember(scene, export, result, digests, settings.resolution)
         folder = "" if output is None else "//" if copies else relative_path(output.path)
         last_bake.remember(scene, report.as_dict(), folder)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)

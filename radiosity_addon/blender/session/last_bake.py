@@ -61,6 +61,7 @@ def forget(scene: bpy.types.Scene) -> None:
     group.property_unset("last_bake")
     group.property_unset("baked_light")
     group.property_unset("baked_objects")
+    group.property_unset("baked_resolution")
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity")

@@ -48,6 +48,11 @@ class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
         description="Objects of the last bake, and their shapes",
         options={"HIDDEN"},
     )
+    baked_resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Baked Resolution",
+        description="Resolution of the last bake: textures are looked at as finely",
+        options={"HIDDEN"},
+    )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Last Bake",
         description="Figures and warnings of the last bake",

@@ -30,7 +30,8 @@ class Boxes:
 
     @staticmethod
     def around(parts: list[Array], margin: float) -> Boxes:
-        """Return boxes around sets of triangles (t, 3, 3), `margin` larger on all sides."""
+        """Return boxes around sets of triangles (t, 3, 3), `margin` larger on all sides; none around none."""
+        parts = [part for part in parts if len(part)]
         low = np.array([part.min(axis=(0, 1)) for part in parts]).reshape(-1, 3)
         high = np.array([part.max(axis=(0, 1)) for part in parts]).reshape(-1, 3)
         return Boxes(low - margin, high + margin)

@@ -10,7 +10,7 @@ import numpy as np
 from ...lights import EnvironmentLight, Lamp, LampGroup, Light
 from ...numerics import LIGHT_STEP, Array, Stream, fill_chunks, irradiance_under_sky, stratified_square
 from ...rays import RayCaster
-from .light_links import lamp_light, sky_share
+from .light_samples import lamp_light, sky_share
 
 SHADOW_RAYS = 32
 """From a point to each lamp."""
