@@ -14,6 +14,9 @@ from .result import BakedObject
 SAMPLES = 256
 """Triangles by which it is found whether levels lie in one place, or side by side."""
 
+CLEARLY_NEARER = 0.5
+"""A level is moved if that brings it this much nearer: what is symmetric is as near when it is mirrored."""
+
 
 def with_levels(bake_scene: BakeScene, baked: Sequence[BakedObject]) -> tuple[BakedObject, ...]:
     """Return baked objects, followed by the coarser levels of them."""
@@ -34,16 +37,23 @@ def _level_uv(bake_scene: BakeScene, level: LevelOfDetail, base: BakedObject) ->
     if not shown.any():
         shown = np.ones(item.count, dtype=bool)
     surface = bake_scene.scene.triangles[item.rows][shown]
-    placed = _placed(level, surface)
-    return uvs_of_level(placed, level.polygon, surface, base.uv[shown])
+    placed, order = _placed(level, surface)
+    uv = uvs_of_level(placed[:, order], level.polygon, surface, base.uv[shown])
+    return np.ascontiguousarray(uv[:, order])
 
 
-def _placed(level: LevelOfDetail, surface: Array) -> Array:
-    """Return a level's triangles where its base is: as they are, or moved there if that is nearer."""
+def _placed(level: LevelOfDetail, surface: Array) -> tuple[Array, slice]:
+    """Return a level's triangles where its base is: as they are, or moved there if that is clearly nearer.
+
+    Returns also the order of their corners in which they face outward, which a mirror turns around.
+    """
+    as_they_are, turned = slice(None), slice(None, None, -1)
     moved = level.triangles @ level.to_base[:3, :3].T + level.to_base[:3, 3]
     if np.allclose(moved, level.triangles):
-        return level.triangles
+        return level.triangles, as_they_are
     some = np.linspace(0, len(moved) - 1, min(len(moved), SAMPLES)).astype(np.int64)
     tree = TriangleTree(surface)
     away = [tree.nearest(each[some].mean(axis=1))[2].mean() for each in (level.triangles, moved)]
-    return moved if away[1] < away[0] else level.triangles
+    if away[1] >= CLEARLY_NEARER * away[0]:
+        return level.triangles, as_they_are
+    return moved, turned if np.linalg.det(level.to_base[:3, :3]) < 0.0 else as_they_are

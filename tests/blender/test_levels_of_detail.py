@@ -195,6 +195,17 @@ def test_an_edited_level_is_baked_again_with_its_finest(room: Path) -> None:
     )
 
 
+def test_a_mirrored_level_shows_the_same_light_next_to_the_finest(room: Path) -> None:
+    """A mirror turns its faces around; they still show what is outside."""
+    for name, x in (("Rock_LOD0", -0.6), ("Rock_LOD1", 0.6)):
+        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(x, 0, 0.8))
+        named(name)
+    fine, mirrored = bpy.data.objects["Rock_LOD0"], bpy.data.objects["Rock_LOD1"]
+    mirrored.scale = (-1, 1, 1)
+    assert bake() == {"FINISHED"}
+    np.testing.assert_allclose(uvs(mirrored), uvs(fine), atol=1e-5)
+
+
 @pytest.mark.parametrize("moved", [("Rock_LOD1",), ("Rock_LOD0", "Rock_LOD1")])
 def test_moved_levels_are_updated_in_a_bake_that_is_kept(room: Path, moved: tuple[str, ...]) -> None:
     """Coarser levels have no triangles in the scene that is solved: what moved of them is empty."""
