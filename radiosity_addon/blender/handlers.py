@@ -18,11 +18,8 @@ from .relight import lightmap_versions
 from .session import facts, state
 from .settings import properties
 
-_AFTER_APPENDING = (
-    ("blend_import_post", properties.unite_looks)
-    if hasattr(bpy.app.handlers, "blend_import_post")
-    else ("depsgraph_update_post", properties.unite_looks_of_more)  # Blender 4.2 reports no appending
-)
+REPORTS_APPENDING = hasattr(bpy.app.handlers, "blend_import_post")
+"""Blender 4.2 does not: there the next bake has all of a file look alike."""
 
 ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_pre", ownership.forget_unsaved),
@@ -31,7 +28,7 @@ ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_post", properties.read_earlier),
     ("load_post", lightmap_versions.check),
     ("load_post", cleaning.look_at_file),
-    _AFTER_APPENDING,
+    *((("blend_import_post", properties.unite_looks),) if REPORTS_APPENDING else ()),
     ("save_pre", lightmap_versions.before_saving),
     ("undo_post", lightmap_versions.follow_undo),
     ("undo_post", overlay_view.forget),

@@ -10,6 +10,7 @@ import pytest
 
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.files import empty_scene
+from radiosity_addon.blender.handlers import REPORTS_APPENDING
 from radiosity_addon.blender.images.node_group import GROUP_NAME
 from radiosity_addon.blender.jobs.inspection import inspect
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -17,6 +18,8 @@ from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 from tests.blender.scenes import add_lamp
 
 pytestmark = pytest.mark.usefixtures("registered")
+
+reports_appending = pytest.mark.skipif(not REPORTS_APPENDING, reason="this Blender reports no appending")
 
 
 @pytest.fixture
@@ -38,6 +41,7 @@ def looks() -> set[str]:
     return {result.inputs[0].links[0].from_node.name for result in results}
 
 
+@reports_appending
 @pytest.mark.parametrize("by", ["script", "operator"])
 @pytest.mark.parametrize("kind", ["Object", "Scene"])
 def test_what_is_appended_is_shown_as_this_file_shows_its_own(
@@ -93,6 +97,7 @@ def test_a_linked_file_with_another_look_is_named(matte_file: Path) -> None:
     assert "matte.blend" not in scene.radiosity.last_bake
 
 
+@reports_appending
 def test_an_appended_lamp_has_the_highlights_of_this_file(tmp_path: Path) -> None:
     add_plane("Far", principled_material())
     add_lamp("POINT", energy=1.0).name = "Bulb"

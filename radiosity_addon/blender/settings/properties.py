@@ -16,9 +16,6 @@ from .preferences import memory_limit_of, threads_of
 _LOOK = ("show", "highlights")
 """What scenes say of the look."""
 
-_counts: list[int] = []
-"""Scenes, objects and node groups when their looks were united last."""
-
 _quiet: list[bool] = []
 """Not empty while that changes without the look itself."""
 
@@ -97,14 +94,6 @@ def unite_looks(_: object = None) -> None:
         show_look_of(scene)
     elif _said_by(scene, "highlights"):
         show_highlights(True)
-
-
-def unite_looks_of_more(_: object = None) -> None:
-    """Do so if there is more or less in the file than at the last call."""
-    counts = [len(blocks) for blocks in (bpy.data.scenes, bpy.data.objects, bpy.data.node_groups)]
-    if counts != _counts:
-        _counts[:] = counts
-        unite_looks()
 
 
 def _said_by(scene: bpy.types.Scene, name: str) -> object:
