@@ -121,8 +121,11 @@ def run_export(
         record = export_record(output.earlier, form.names, lightmaps, light.mix, left)
         output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
         output.publish()
-        older = [f"{name} is of earlier lightmaps" for name in older_files(record, output.path)]
-    return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *older))
+        older = older_files(record, output.path)
+        kept = sorted(name for name in left.difference(older) if (output.path / name).is_file())
+    notes = [f"{name} is of earlier lightmaps" for name in older]
+    notes += [f"{name} stays as an earlier export wrote it" for name in kept]
+    return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *notes))
 
 
 _Colors = dict[str, list[Array]]
