@@ -12,7 +12,7 @@ import pytest
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.keyed_paths import curves
 from radiosity_addon.blender.files.files import empty_scene
-from radiosity_addon.blender.material_copies.copy_marks import COPY_MARKS
+from radiosity_addon.blender.material_copies.copy_marks import COPY_MARKS, FOLLOWS
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from tests.blender.edited_copies import GREEN, Material, copy_of, grouped_material, shader
 from tests.blender.eevee import seen_in_eevee
@@ -245,6 +245,19 @@ for frame in (1, 6, 11):
     bpy.context.scene.frame_set(frame)
     look()
 """
+
+
+def test_keyframes_on_a_node_that_follows_are_named() -> None:
+    """They have no effect there, and Restore keeps the original's."""
+    material = keyed("Base Color", GREEN, WHITE)()
+    add_plane(material=material)
+    bake_by_hand((TEXEL,))
+    copy = copy_of(material)
+    assert carry_material_edits() == ()
+    (node,) = [node for node in copy.node_tree.nodes if node.get(FOLLOWS) is not None]
+    node.outputs[0].keyframe_insert("default_value", frame=5)
+    (warning,) = carry_material_edits()
+    assert f"its node '{node.name}' follows the animation of the original" in warning.message
 
 
 def test_eevee_follows_keyframes(tmp_path: Path) -> None:

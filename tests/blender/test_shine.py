@@ -105,6 +105,14 @@ def test_in_even_light_it_looks_so_from_the_side(kind: str, degrees: int, tmp_pa
     )
 
 
+def assert_looks_as_unbaked(folder: Path, light: tuple[float, ...], *, samples: int, within: float) -> None:
+    """Bake a light by hand, and compare the mean of what is seen with that of before."""
+    expected = seen_from_above(folder, 8, samples=samples).mean(axis=(0, 1))
+    bake_by_hand((light,), show="shine")
+    shown = seen_from_above(folder, 8, samples=samples).mean(axis=(0, 1))
+    np.testing.assert_allclose(shown, expected, rtol=within)
+
+
 @pytest.mark.one_blender
 @pytest.mark.parametrize("degrees", [0, 60])
 @pytest.mark.parametrize("level", [0.0, 0.5])
@@ -117,18 +125,12 @@ def test_what_is_a_metal_in_part_looks_as_unbaked(
     plane = add_plane(material=paint)
     plane.rotation_euler.x, plane.scale = np.radians(degrees), (9.0, 9.0, 9.0)
     set_world(*WHITE)
-    expected = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
-    bake_by_hand((WHITE,), show="shine")
-    shown = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
-    np.testing.assert_allclose(shown, expected, rtol=0.04)
+    assert_looks_as_unbaked(tmp_path, WHITE, samples=128, within=0.04)
     restore(bpy.context)
     set_world(0.25, 0.25, 0.25)
     add_lamp("SUN", energy=3.0, transform={"rotation_euler": (np.radians(degrees - 40.0), 0.0, 0.0)})
     received = 0.25 + 3.0 * np.cos(np.radians(40.0)) / np.pi
-    expected = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
-    bake_by_hand(((received,) * 3,), show="shine")
-    shown = seen_from_above(tmp_path, 8, samples=128).mean(axis=(0, 1))
-    np.testing.assert_allclose(shown, expected, rtol=0.015)
+    assert_looks_as_unbaked(tmp_path, (received,) * 3, samples=128, within=0.015)
 
 
 @pytest.mark.parametrize("kind", DIFFUSE)
@@ -240,10 +242,7 @@ def test_what_shines_next_to_a_diffuse_shader_stays(kind: str, place: str, mix: 
     plane.rotation_euler.x, plane.scale = np.radians(50), (9.0, 9.0, 9.0)
     received = 3.0 * np.cos(np.radians(50.0)) / np.pi
     set_world(*WHITE)
-    expected = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
-    bake_by_hand((WHITE,), show="shine")
-    shown = seen_from_above(tmp_path, 8, samples=256).mean(axis=(0, 1))
-    np.testing.assert_allclose(shown, expected, rtol=0.01)
+    assert_looks_as_unbaked(tmp_path, WHITE, samples=256, within=0.01)
     restore(bpy.context)
     bpy.context.scene.world = None
     add_lamp("SUN", energy=3.0, transform={"rotation_euler": (np.radians(100.0), 0.0, 0.0)})

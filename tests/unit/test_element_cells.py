@@ -7,7 +7,14 @@ import pytest
 
 from radiosity_addon.rays.caster import Hits
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver.gather.element_cells import CELLS_PER_ELEMENT, FINE, FINEST, NEAR, ElementCells
+from radiosity_addon.solver.gather.element_cells import (
+    CELLS_PER_ELEMENT,
+    FINE,
+    FINEST,
+    MAX_DEPTH,
+    NEAR,
+    ElementCells,
+)
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import gray_scene, rectangle, solid_box
@@ -113,8 +120,9 @@ def test_parts_that_answer_are_no_wider_than_a_few_texels(texel: float, distance
     width = size * radius / parts.radius(leaf)
     assert (width <= FINE * texel * (1 + 1e-6)).all()
     if distance < NEAR * FINEST * texel:
+        finest = np.maximum(FINEST * texel, size / 4**MAX_DEPTH)
         large = size > FINE * texel
-        assert (width[large] <= FINEST * texel * (1 + 1e-6)).all() or texel < 0.01
+        assert (width[large] <= finest[large] * (1 + 1e-6)).all()
     assert (np.linalg.norm(anchor[:, :2] - position, axis=1) <= radius).all()
     assert texel < 0.3 or (part == leaf).all()
 

@@ -9,7 +9,7 @@ import bpy
 
 from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.keyed_paths import curves, is_keyed, path_of
-from .copy_marks import FOLLOWS, copied_groups, followed_socket
+from .copy_marks import FOLLOWS, copied_groups, followed_socket, is_added
 
 
 def follow_keys(copy: bpy.types.Material) -> None:
@@ -19,6 +19,26 @@ def follow_keys(copy: bpy.types.Material) -> None:
         _follow(copy.node_tree, original, "MATERIAL", "node_tree.")
     for group in dict.fromkeys(copied_groups(copy.node_tree)):
         _follow(group, group[ORIGINAL], "NODETREE", "")
+
+
+def overruled(tree: bpy.types.NodeTree) -> list[str]:
+    """Return the nodes of ours that follow an animated value, and that the user animated all the same."""
+    return [
+        node.name
+        for node in tree.nodes
+        if node.get(FOLLOWS) is not None and is_added(node) and any(map(_is_users, _curves_of(tree, node)))
+    ]
+
+
+def _curves_of(tree: bpy.types.NodeTree, node: bpy.types.Node) -> list[bpy.types.FCurve]:
+    path = path_of(node.outputs[0])
+    return [curve for curve in curves(tree) if curve.data_path == path]
+
+
+def _is_users(curve: bpy.types.FCurve) -> bool:
+    """Whether a curve of a node that follows is not the driver of ours."""
+    driver = curve.driver
+    return driver is None or driver.type != "AVERAGE" or len(driver.variables) != 1
 
 
 def is_animated(tree: bpy.types.NodeTree) -> bool:

@@ -28,6 +28,7 @@ from ..material_copies.copy_marks import (
     TOKEN,
     copied_groups,
 )
+from ..material_copies.followed_values import overruled
 from ..material_copies.material_digest import digest_of_material, tree_digest
 from ..materials.materials import uses_nodes
 from .copy_values import take_values, write_material, write_settings, write_tree
@@ -63,13 +64,20 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
     """Carry the edits of one copy."""
     if is_legacy(copy):
         return _carry_legacy(copy)
+    warnings = [
+        BakeWarning(
+            copy.name,
+            f"material '{copy.name}': its node '{name}' follows the animation of the original, so keyframes "
+            "and drivers set on the node are not kept: set them on the shader's input after Restore",
+        )
+        for name in overruled(copy.node_tree)
+    ]
     original = copy.get(ORIGINAL)
     shown, edited = copy.name, copy[STATE] != digest_of_material(copy, as_copy=True)
     if not edited and not is_duplicate and copy.name == copy[COPY_NAME]:
         take_marks(original, copy)
-        return []
+        return warnings
     renamed = _base_name(copy.name) != _base_name(copy[COPY_NAME])
-    warnings: list[BakeWarning] = []
     if edited or is_duplicate or (renamed and original is None):
         stripped, complete = stripped_copy(copy)
         content = digest_of_material(stripped)
