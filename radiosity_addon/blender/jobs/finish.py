@@ -22,7 +22,7 @@ from ..apply.apply import apply_steps
 from ..apply.rebake import EarlierBake, replacing_earlier
 from ..apply.restore import restore
 from ..apply.scopes import files_shown_by, keeping_theirs, of_scene
-from ..apply.shown_bake import remember
+from ..apply.shown_bake import remember, remember_content
 from ..datablocks.bake_record import remove_datablocks
 from ..files.output import OutputFolder
 from ..files.saved_files import save_copy
@@ -48,7 +48,7 @@ WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
 
 _MEMORY = {
-    "radiosity": ("last_bake", "baked_light", "baked_objects", "baked_resolution"),
+    "radiosity": last_bake.MEMORY,
     "radiosity_relight": ("mark", "strengths"),
 }
 """What a scene remembers of its bake, by property group."""
@@ -133,10 +133,11 @@ def finish(
             result = replace(result, warnings=(*warnings, *result.warnings))
         # A copy remembers its bake too; the time that is left to do is not in its figures.
         report = _report(result, images, groups, settings, seconds)
-        remember(scene, export, result, digests, settings.resolution)
+        remember(scene, export, result, digests, settings)
         folder = "" if output is None else "//" if copies else relative_path(output.path)
         last_bake.remember(scene, report.as_dict(), folder)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
+        remember_content(scene)
         if output is not None and copies is None:
             whole = report.joined(output.earlier, earlier.kept_sources)
             lightmap_versions.publish(output, _with_sidecar(whole, output, keeping))
