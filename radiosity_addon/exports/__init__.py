@@ -5,6 +5,7 @@ Arrays and bytes only; `blender/exporting` makes the scene that is written.
 
 from __future__ import annotations
 
+from .baked_light import emission_images
 from .engine_files import static_files
 from .glb import Glb, GlbError
 from .half_exr import read_half_exr, write_half_exr
@@ -31,6 +32,7 @@ __all__ = [
     "PageEntry",
     "decode_rgb9e5",
     "decode_rgbm",
+    "emission_images",
     "emissive_only",
     "encode_rgb9e5",
     "encode_rgbm",

@@ -20,6 +20,7 @@ from ...base import BakeError, Status, staged
 from ...exports import (
     INDEX_NAME,
     Glb,
+    emission_images,
     emissive_only,
     lightmap_index,
     png_of_linear,
@@ -106,8 +107,7 @@ def run_export(
             files[INDEX_NAME] = lightmap_index(light.index(scene, places, entries)).encode()
             if form.lit_scene:
                 yield Status("baked glTF", 0.8)
-                pages = _light_pages(scene, light, colors)
-                files[BAKED] = emissive_only(written, scene.names, pages).to_bytes()
+                files[BAKED] = _baked(scene, light, colors, written).to_bytes()
         if form.viewer:
             shown = {name: data for name, data in images.items() if name.endswith(".ktx2")}
             inside = {LIT: files[LIT], INDEX_NAME: files[INDEX_NAME], **shown}
@@ -230,18 +230,15 @@ def _window_kept(context: bpy.types.Context) -> Iterator[None]:
             window.view_layer = layer
 
 
-def _light_pages(
-    scene: ExportScene, light: ExportedLightmaps, colors: _Colors
-) -> dict[tuple[int, bool], tuple[bytes, float]]:
-    """Return the images of what leaves surfaces, for each page, and for glowing materials apart."""
-    found = {}
+def _baked(scene: ExportScene, light: ExportedLightmaps, colors: _Colors, written: Glb) -> Glb:
+    """Return the file whose surfaces emit what leaves them."""
+    radiance, factors = {}, {}
     for number, page in enumerate(light.pages):
         base = colors[BASE][number]
-        leaving = base * resampled(page, base.shape[1], base.shape[0])
-        for glows in {each.glows for each in scene.materials if each.page == number}:
-            radiance = leaving
-            if glows:
-                radiance = leaving + colors[EMISSION][number]
-            white = max(float(radiance.max(initial=0.0)), 1e-6)
-            found[number, glows] = png_of_linear(radiance / white), white
-    return found
+        radiance[number] = base * resampled(page, base.shape[1], base.shape[0])
+        if EMISSION in colors:  # black where nothing glows
+            radiance[number] += colors[EMISSION][number]
+        factors[number] = base.shape[1] // page.shape[1]
+    images, read_by = emission_images(written, scene.names, radiance, factors)
+    encoded = [(png_of_linear(image.colors), image.white) for image in images]
+    return emissive_only(written, scene.names, encoded, read_by)

@@ -147,7 +147,6 @@ class _Copies:
             self._nodes,
             self._meshes,
             {each.material.name: (each.name, each.page) for each in made.materials},
-            [each.material.name for each in made.materials if each.glows],
             [each.material.name for each in made.materials if each.evaluated],
             self._groups,
         )
