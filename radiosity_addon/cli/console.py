@@ -153,7 +153,8 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     if warnings:
         lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}:")
         lines += [f"  {warning['name']}: {warning['message']}" for warning in one_of_each(warnings)]
-    return lines
+    notes = [f"note: {note['message']}" for note in one_of_each(report.get("notes", ()))]
+    return [*lines, *notes]
 
 
 def _of_glass(objects: Sequence[str], power: dict[str, float] | None) -> str:

@@ -1,4 +1,4 @@
-"""Images of the light that surfaces send out: each surface reads one whose white is little brighter than itself."""
+"""Images of the light that surfaces send out: each surface reads one whose white is not much brighter."""
 
 from __future__ import annotations
 

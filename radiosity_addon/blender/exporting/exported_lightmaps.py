@@ -68,6 +68,9 @@ class ExportedLightmaps:
         notes = list(dict.fromkeys(note for material in scene.materials for note in material.notes))
         if shown.light == "indirect":
             notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
+        if scene.left_out:
+            named = ", ".join(f"'{name}'" for name in scene.left_out)
+            notes.append(f"levels of detail that are hidden from renders are not exported: {named}")
         uneven = [
             f"{page.shape[1]} × {page.shape[0]}" for page in pages if page.shape[0] % 4 or page.shape[1] % 4
         ]

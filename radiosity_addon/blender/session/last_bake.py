@@ -26,6 +26,7 @@ class LastBake(NamedTuple):
     """One of each kind where there are many alike."""
     warning_count: int = 0
     folder: str = ""
+    notes: tuple[str, ...] = ()
 
 
 _parsed: tuple[str, LastBake | None] = "", None
@@ -52,6 +53,7 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
             "seconds": sum(report["seconds"].values()),
             "warnings": [[w["name"], w["message"]] for w in warnings[:MAX_WARNINGS]],
             "warning_count": len(warnings),
+            "notes": [note["message"] for note in one_of_each(report.get("notes", ()))[:MAX_WARNINGS]],
             "folder": folder,
         }
     )
@@ -111,6 +113,7 @@ def _parse(text: str) -> LastBake | None:
             warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),
             warning_count=int(record["warning_count"]),
             folder=str(record["folder"]),
+            notes=tuple(map(str, record.get("notes", ()))),
         )
     except (ValueError, KeyError, TypeError):
         return None
