@@ -14,6 +14,7 @@ from pathlib import Path
 
 import addon_utils  # type: ignore[import-not-found]
 import bpy
+import numpy as np
 
 from ...bake.result import BakeReport
 from ...base import BakeError, Status, staged
@@ -29,12 +30,15 @@ from ...exports import (
     static_files,
     viewer_page,
     with_lightmaps,
+    write_ktx2,
 )
 from ...files import PLAIN_NAMES, export_record, older_files
 from ...numerics import Array
 from ...options import Form
+from ..cycles.world import seen_background
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
+from ..scene_records.render_options import world_of
 from .bake_units import bake_units
 from .edits_since_bake import edits_since_bake
 from .evaluated_colors import evaluate_channel, image_of, side_factor
@@ -43,6 +47,9 @@ from .export_scene import PREFIX, ExportScene, export_scene
 from .exported_lightmaps import ExportedLightmaps, endings, rgbm_names
 
 LIT, BAKED, VIEWER = "scene.glb", "scene_baked.glb", "viewer.html"
+BACKGROUND = "background.ktx2"
+"""In viewer.html: what is behind all objects, around, row 0 at the lowest latitude."""
+
 REPORT_VERSION = 1
 
 
@@ -109,8 +116,9 @@ def run_export(
                 yield Status("baked glTF", 0.8)
                 files[BAKED] = _baked(scene, light, colors, written).to_bytes()
         if form.viewer:
-            shown = {name: data for name, data in images.items() if name.endswith(".ktx2")}
-            inside = {LIT: files[LIT], INDEX_NAME: files[INDEX_NAME], **shown}
+            yield Status("background", 0.85)
+            inside = {LIT: files[LIT], INDEX_NAME: files[INDEX_NAME], **_background(context)}
+            inside |= {name: data for name, data in images.items() if name.endswith(".ktx2")}
             files[VIEWER] = viewer_page(context.scene.name, inside)
         yield Status("write", 0.9)
         for name, data in files.items():
@@ -126,6 +134,13 @@ def run_export(
     notes = [f"{name} is of earlier lightmaps" for name in older]
     notes += [f"{name} stays as an earlier export wrote it" for name in kept]
     return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *notes))
+
+
+def _background(context: bpy.types.Context) -> dict[str, bytes]:
+    """Return the file of what a render shows behind all objects; none where that is transparent."""
+    if context.scene.render.film_transparent:
+        return {}
+    return {BACKGROUND: write_ktx2(seen_background(world_of(context)).astype(np.float32))}
 
 
 _Colors = dict[str, list[Array]]

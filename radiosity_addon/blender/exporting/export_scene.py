@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...base import SceneError
-from ...exports import ExportedNames
+from ...exports import ExportedNames, ViewSettings
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import ORIGINAL, is_made, remove_datablocks
 from ..material_copies.material_slots import is_copy
@@ -38,12 +38,14 @@ class ExportScene:
     user_scene: The name of the one that it is of.
     objects mapping of str to Object: The copies by the full names of the user's objects.
     baked: Names of those with a lightmap, with its page.
+    view: How the user's scene is shown.
     left_out: Names of levels of detail of them that renders hide.
     """
 
     scene: bpy.types.Scene
     user_scene: str
     shown: ShownLightmaps
+    view: ViewSettings
     objects: dict[str, bpy.types.Object] = field(default_factory=dict)
     baked: dict[str, int] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
@@ -72,7 +74,9 @@ def export_scene(context: bpy.types.Context) -> ExportScene:
     """
     shown_objects = list(rendered_objects(context.view_layer))
     shown = shown_lightmaps([obj for obj in shown_objects if obj.type == "MESH"])
-    made = ExportScene(bpy.data.scenes.new("Radiosity Export"), context.scene.name, shown)
+    own = context.scene.view_settings
+    view = ViewSettings(own.view_transform, own.look, own.exposure, own.gamma)
+    made = ExportScene(bpy.data.scenes.new("Radiosity Export"), context.scene.name, shown, view)
     made.made.append(made.scene)
     made.scene[TEMPORARY] = True
     made.scene.frame_set(context.scene.frame_current)
