@@ -122,9 +122,7 @@ def run_export(
             files[VIEWER] = viewer_page(context.scene.name, inside)
         yield Status("write", 0.9)
         for name, data in files.items():
-            path = output.staging / name
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(data)
+            _write(output.staging / name, data)
         left = {BAKED, VIEWER, *rgbm_names(light.stems)} - files.keys()
         record = export_record(output.earlier, form.names, lightmaps, light.mix, left)
         output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
@@ -134,6 +132,15 @@ def run_export(
     notes = [f"{name} is of earlier lightmaps" for name in older]
     notes += [f"{name} stays as an earlier export wrote it" for name in kept]
     return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *notes))
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write a file; an OSError names it also where the disk is full."""
+    try:
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(data)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def _background(context: bpy.types.Context) -> dict[str, bytes]:
