@@ -1,9 +1,9 @@
 /* The program of viewer.html: the scene with its lightmaps, and a panel. Bundled by `build.py viewer`. */
 
 import {
-  ACESFilmicToneMapping, AgXToneMapping, Box3, Color, DataTexture, EquirectangularReflectionMapping, FloatType,
-  LinearFilter, LinearSRGBColorSpace, LinearToneMapping, NeutralToneMapping, PerspectiveCamera, Raycaster, RGBAFormat,
-  Scene, Vector2, Vector3, WebGLRenderer,
+  ACESFilmicToneMapping, AgXToneMapping, Box3, Color, CubeCamera, DataTexture, EquirectangularReflectionMapping,
+  FloatType, HalfFloatType, LinearFilter, LinearSRGBColorSpace, LinearToneMapping, NeutralToneMapping,
+  PerspectiveCamera, PMREMGenerator, Raycaster, RGBAFormat, Scene, Vector2, Vector3, WebGLCubeRenderTarget, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { colorsOf, loadLit, readKtx2 } from '../../radiosity_addon/exports/assets/three-lightmap.js';
@@ -71,7 +71,9 @@ async function start() {
   });
   controls.addEventListener('change', draw);
   addEventListener('resize', resize);
-  addSliders([shiny, matte], draw);
+  const reflect = () => reflectIn(renderer, scene, shiny, camera, target);
+  addSliders([shiny, matte], () => { reflect(); draw(); });
+  reflect();
   const raycaster = new Raycaster();
   renderer.domElement.addEventListener('pointermove', (event) => {
     const place = new Vector2(2 * event.clientX / innerWidth - 1, 1 - 2 * event.clientY / innerHeight);
@@ -161,14 +163,35 @@ function illuminanceAt(lit, hit) {
 
 function lightmapOnly(material, only) {
   material.userData.kept ??= { color: material.color.clone(), map: material.map, metalness: material.metalness,
-    emissiveIntensity: material.emissiveIntensity, aoMap: material.aoMap };
+    emissiveIntensity: material.emissiveIntensity, aoMap: material.aoMap, mirrors: material.envMap };
   const kept = material.userData.kept;
   material.color.copy(only ? new Color(1, 1, 1) : kept.color);
   material.emissiveIntensity = only ? 0 : kept.emissiveIntensity;
   // Cut-outs are in the image of the color.
   material.map = only && !material.alphaTest && !material.transparent ? null : kept.map;
   if (kept.metalness !== undefined) material.metalness = only ? 0 : kept.metalness;
+  if (kept.mirrors) material.envMap = only ? null : kept.mirrors;
   material.needsUpdate = true;
+}
+
+/** Metal mirrors what is around the place that is looked at: a lightmap holds no surroundings. It has no diffuse
+ *  color, to which three.js would add their light once more. */
+function reflectIn(renderer, scene, lit, camera, place) {
+  const metals = [...lit.materials.values()].filter((each) => each.metalness > 0.99 && !each.metalnessMap);
+  if (!metals.length) return;
+  const seen = new WebGLCubeRenderTarget(256, { type: HalfFloatType });
+  const around = new CubeCamera(camera.near, camera.far, seen);
+  around.position.copy(place);
+  for (const material of metals) material.visible = false; // the place may be within one
+  around.update(renderer, scene);
+  const filtered = new PMREMGenerator(renderer).fromCubemap(seen.texture).texture;
+  for (const material of metals) {
+    material.envMap?.dispose();
+    Object.assign(material, { envMap: filtered, visible: true });
+    if (material.userData.kept) material.userData.kept.mirrors = filtered;
+    material.needsUpdate = true;
+  }
+  seen.dispose();
 }
 
 function addSliders(scenes, draw) {

@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 import radiosity_addon
 from radiosity_addon.blender.command_line.main import main
@@ -95,3 +96,44 @@ def test_a_transparent_film_leaves_the_background_to_the_page(tmp_path: Path) ->
     page = (tmp_path / "out" / "export" / "viewer.html").read_text(encoding="utf-8")
     assert 'data-file="background.ktx2"' not in page
     assert 'data-file="scene.glb"' in page
+
+
+def test_metal_mirrors_what_is_around(tmp_path: Path) -> None:
+    """A ball of metal shows the sky on all sides; of a lightmap alone it would be black."""
+    chromium()
+    build(tmp_path / "open.blend", "Standard", 0.0)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.6, location=(0, 0, 0.8), segments=64, ring_count=32)
+    metal = shader_material(
+        "Metal",
+        "ShaderNodeBsdfPrincipled",
+        Metallic=1.0,
+        Roughness=0.1,
+        **{"Base Color": (0.9, 0.9, 0.9, 1.0)},
+    )
+    ball = bpy.context.object
+    ball.data.materials.append(metal)
+    ball.data.shade_smooth()
+    direction = Vector((0, 0, 0.8)) - bpy.context.scene.camera.location
+    bpy.context.scene.camera.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
+    bpy.ops.wm.save_mainfile()
+    radiosity_addon.register()
+    assert main(["bake", str(tmp_path / "open.blend"), "--output", str(tmp_path / "out"), *BAKE]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "baked.blend"))
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples = "CYCLES", 64
+    scene.render.filepath = str(tmp_path / "render.png")
+    bpy.ops.render.render(write_still=True)
+    radiosity_addon.unregister()
+    with viewer(tmp_path / "out" / "export" / "viewer.html", *SIZE) as shown:
+        shown.evaluated("document.getElementById('panel').hidden = true")
+        (tmp_path / "viewer.png").write_bytes(shown.picture())
+        metals = "[...viewer.shiny.materials.values()].filter(m => m.envMap).map(m => m.name)"
+        assert shown.evaluated(metals) == ["Metal"]
+        shown.evaluated("document.getElementById('only').click()")
+        assert shown.evaluated(metals) == []
+        shown.evaluated("document.getElementById('only').click()")
+        assert shown.evaluated(metals) == ["Metal"]
+    middle = (slice(70, 130), slice(120, 180))
+    drawn, rendered = (pixels_of(tmp_path / name)[middle] for name in ("viewer.png", "render.png"))
+    assert rendered.max() > 0.4
+    assert np.quantile(np.abs(drawn - rendered).max(axis=2), 0.8) < 0.1
