@@ -217,20 +217,16 @@ def sweep(
             seen(direct + indirect)
         if largest <= tolerance * total / max(3 * texel_count, 1):
             break
-    smoothing = None if smooth is None else smooth.known
-    noise = None
-    if estimate:
-        noise = estimated_noise(links, table, threads, scratch)
-        if smooth is not None and smoothing is None:
-            gathered = _difference(direct, lamps, scratch)
-            for rows in tiles(texel_count):
-                gathered[rows] += indirect[rows]
-            smoothing = choose_smoothing(smooth.geometry, smooth.alike, gathered, noise, threads)
-    if smooth is not None and smoothing is not None:
-        parts = [indirect]
-        if beyond.any():
-            parts.append(_difference(direct, lamps, scratch))
-        shared = smoothing(smooth.geometry, columns(parts, scratch), threads)
+    noise = estimated_noise(links, table, threads, scratch) if estimate else None
+    smoothing, shared = None, None
+    if smooth is not None:
+        parts = [indirect, *([_difference(direct, lamps, scratch)] if beyond.any() else [])]
+        if smooth.known is not None:
+            smoothing, shared = smooth.known, smooth.known(smooth.geometry, columns(parts, scratch), threads)
+        elif noise is not None:
+            smoothing, shared = choose_smoothing(smooth.geometry, smooth.alike, parts, noise, threads)
+        del parts
+    if shared is not None:
         for rows in tiles(texel_count):
             indirect[rows] = np.maximum(shared[rows, :3], 0.0)
             if beyond.any():
