@@ -46,7 +46,8 @@ class Exporter:
 
     def run(self, web: bool, hook: str = "") -> int:
         """Export with the viewer, or without; returns the code of the process."""
-        code = f"import bpy\n{hook}\n{self._program(web)}"
+        # Blender 4.2 as a module may crash at exit.
+        code = f"import bpy, os\n{hook}\n{self._program(web)}\nos._exit(0)"
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         done = subprocess.run(
             [sys.executable, "-c", code],
