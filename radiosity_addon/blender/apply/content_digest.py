@@ -32,7 +32,7 @@ _EVALUATED = frozenset(
     (
         "bound_box", "dimensions", "matrix_world", "matrix_local", "matrix_basis", "motion_path",
         "point_cache", "point_caches", "particles", "child_particles", "node_warnings", "is_evaluated",
-        "is_runtime_data", "all_objects", "original",
+        "is_runtime_data", "all_objects", "original", "properties",
     )
 )  # fmt: skip
 """Properties that follow from others, or that Blender fills in."""
@@ -42,13 +42,14 @@ _OTHERWISE = frozenset(
         "name", "tag", "use_fake_user", "use_extra_user", "preview", "asset_data", "animation_data",
         "library_weak_reference", "override_library", "grease_pencil", "lineart", "node_tree", "pose",
         "bones", "shape_keys", "attributes", "color_attributes", "points", "position_data",
-        "curve_offset_data", "surface_normals", "mode", "radiosity_bake",
+        "curve_offset_data", "surface_normals", "mode", "collections", "collections_all", "radiosity_bake",
         *(("use_nodes",) if bpy.app.version >= (5, 0) else ()),
     )
 )  # fmt: skip
 """Properties of datablocks that do not count, or are read in another way."""
 
 _DATABLOCK = _EVALUATED | _OTHERWISE
+_POSE = _DATABLOCK | {"bone", "parent", "child"}
 _STRUCTS = StructReader(
     _EVALUATED | {"parent", "child", "children_recursive", "bone", "node_tree"},
     ("active_", "bl_", "is_property_", "select"),
@@ -60,7 +61,7 @@ def content_digest() -> str | None:
 
     Images count by their files' sizes and times: those that were painted and not saved cannot be known.
     """
-    if any(image.is_dirty and not is_made(image) for image in bpy.data.images):
+    if any(image.is_dirty and not is_made(image) for image in _used("images")):
         return None
     found = hashlib.blake2b(digest_size=16)
     try:
@@ -75,18 +76,25 @@ def _contents() -> Iterator[str]:
     for scene in bpy.data.scenes:
         yield repr((scene.name_full, _scene(scene)))
     for kind in _KINDS:
-        for block in getattr(bpy.data, kind):
+        for block in _used(kind):
             yield repr((block.name_full, _datablock(block)))
-    for mesh in bpy.data.meshes:
-        yield f"{mesh.name_full} {digest_of_mesh(mesh)} {plain(mesh.materials)}"
-    for material in bpy.data.materials:
+    for mesh in _used("meshes"):
+        rendered = [layer.name for layer in mesh.uv_layers if layer.active_render]
+        rendered.append(str(mesh.color_attributes.render_color_index))
+        yield f"{mesh.name_full} {digest_of_mesh(mesh)} {plain(mesh.materials)} {rendered}"
+    for material in _used("materials"):
         yield f"{material.name_full} {digest_of_material(material)}"
-    for tree in bpy.data.node_groups:
+    for tree in _used("node_groups"):
         if not is_made(tree) or is_copied_group(tree):
             yield f"{tree.name_full} {tree_digest(tree)}"
-    for image in bpy.data.images:
+    for image in _used("images"):
         if not is_made(image):
             yield repr((image.name_full, _image(image)))
+
+
+def _used(kind: str) -> list[Any]:
+    """Return the datablocks of a kind; without those that nothing uses, which saving leaves out."""
+    return [block for block in getattr(bpy.data, kind) if block.users]
 
 
 def _datablock(block: bpy.types.ID) -> list[Any]:
@@ -98,12 +106,9 @@ def _datablock(block: bpy.types.ID) -> list[Any]:
     if tree is not None:
         found.append(tree_digest(tree))
     if isinstance(block, bpy.types.Object):
-        # What Geometry Nodes' inputs are set to.
-        found += [custom_properties(each, ()) for each in block.modifiers if each.type == "NODES"]
+        found += [_inputs_of_nodes(each) for each in block.modifiers if each.type == "NODES"]
         if block.pose is not None:
-            found += [
-                [_STRUCTS.read(bone, _DATABLOCK), custom_properties(bone, ())] for bone in block.pose.bones
-            ]
+            found += [[_STRUCTS.read(bone, _POSE), custom_properties(bone, ())] for bone in block.pose.bones]
     if isinstance(block, bpy.types.Armature):
         found += [(bone.name, plain(bone.matrix_local), bone.length) for bone in block.bones]
     if isinstance(block, bpy.types.Lattice):
@@ -116,13 +121,31 @@ def _datablock(block: bpy.types.ID) -> list[Any]:
     return found
 
 
+def _inputs_of_nodes(modifier: bpy.types.NodesModifier) -> list[Any]:
+    """Return what the inputs of Geometry Nodes are set to."""
+    if bpy.app.version < (5, 2):  # a file that is opened again has 0 for False
+        values = custom_properties(modifier, ())
+        return [(name, int(value) if isinstance(value, bool) else value) for name, value in values]
+    inputs = modifier.properties.inputs
+    names = [prop.identifier for prop in inputs.bl_rna.properties if prop.type == "POINTER"]
+    given = [(name, getattr(inputs, name)) for name in names if name != "rna_type"]
+    return [(name, [plain(getattr(each, key)) for key in _own_names(each)]) for name, each in given]
+
+
+def _own_names(struct: bpy.types.bpy_struct) -> list[str]:
+    """Return the names of the properties of a struct whose type is its own."""
+    return [prop.identifier for prop in struct.bl_rna.properties if prop.identifier != "rna_type"]
+
+
 def _scene(scene: bpy.types.Scene) -> list[Any]:
     """Return what of a scene a bake reads."""
     layers = [
         (
             layer.name,
             layer.use,
+            layer.use_sky,
             plain(layer.material_override),
+            plain(getattr(layer, "world_override", None)),
             _STRUCTS.read(layer.layer_collection, _EVALUATED),
             [each.name for each in layer.lightgroups],
         )
