@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -126,4 +127,21 @@ def test_painted_pixels_that_are_not_saved_cannot_be_known(scene: None, tmp_path
     before = content_digest()
     assert before
     image.pack()
+    assert content_digest() not in (None, before)
+
+
+def test_a_tile_that_was_painted_changes_it(scene: None, tmp_path: Path) -> None:
+    tiles = [tmp_path / f"tile.{number}.png" for number in (1001, 1002)]
+    for tile in tiles:
+        made = bpy.data.images.new("Tile", 2, 2)
+        made.filepath_raw, made.file_format = str(tile), "PNG"
+        made.save()
+        bpy.data.images.remove(made)
+    image = bpy.data.images.load(str(tiles[0]))
+    image.source = "TILED"
+    image.filepath = str(tmp_path / "tile.<UDIM>.png")
+    add_node(bpy.data.materials["Paint"].node_tree, "ShaderNodeTexImage").image = image
+    before = content_digest()
+    assert content_digest() == before
+    os.utime(tiles[1], ns=(10**18, 10**18))
     assert content_digest() not in (None, before)

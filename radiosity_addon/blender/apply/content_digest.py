@@ -185,8 +185,12 @@ def _files(image: bpy.types.Image) -> Iterable[Any]:
             image.generated_height,
         )
     elif not image.packed_files and image.filepath:
+        path = Path(bpy.path.abspath(image.filepath, library=image.library))
+        several = image.source in {"TILED", "SEQUENCE"}
         try:
-            status = Path(bpy.path.abspath(image.filepath, library=image.library)).stat()
-            yield status.st_size, status.st_mtime_ns
+            files = sorted(path.parent.glob(f"*{path.suffix}")) if several else [path]
+            for file in files:
+                status = file.stat()
+                yield status.st_size, status.st_mtime_ns
         except OSError:
             yield "missing"
