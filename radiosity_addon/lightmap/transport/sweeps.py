@@ -16,6 +16,7 @@ from ...solver.gather import LightGains
 from ..points import Smoothing, choose_smoothing, columns
 from ..texels import TexelGeometry
 from .gather_links import GatherLinks
+from .ray_runs import noise_weights
 from .source_means import CHUNK_HITS, SourceMeans, by_channel, mean_of_sources
 from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
@@ -275,8 +276,10 @@ def estimated_noise(
     half = links.sources.shape[1] // 2
     whole = mean_of_sources(table, links.sources, threads, scratch=scratch, tints=links.tints)
     part = mean_of_sources(table, links.sources, threads, half, scratch, links.tints)
+    run = np.zeros(len(part), dtype=np.int16) if links.run is None else links.run
+    weights, alone = noise_weights(run)
     for rows in tiles(len(part)):
-        part[rows] -= whole[rows]
+        part[rows] = np.where(alone[rows, None], part[rows] - whole[rows], weights[rows, None] * whole[rows])
     del whole
     return links.spread(part, scratch=scratch)
 
