@@ -145,3 +145,17 @@ def test_a_tile_that_was_painted_changes_it(scene: None, tmp_path: Path) -> None
     assert content_digest() == before
     os.utime(tiles[1], ns=(10**18, 10**18))
     assert content_digest() not in (None, before)
+
+
+def test_what_cannot_be_read_cannot_be_known(scene: None) -> None:
+    """A property of an add-on's whose struct holds itself."""
+    holder = type("Holder", (bpy.types.PropertyGroup,), {})
+    bpy.utils.register_class(holder)
+    holder.inner = bpy.props.PointerProperty(type=holder)
+    bpy.types.Object.itself = bpy.props.PointerProperty(type=holder)
+    try:
+        assert content_digest() is None
+    finally:
+        del bpy.types.Object.itself
+        bpy.utils.unregister_class(holder)
+    assert content_digest()

@@ -59,8 +59,11 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
 
 def test_a_file_that_was_not_edited_is_not_read(baked: Path, reads: list[object]) -> None:
-    """After the bake, opened again, in another folder, and shown with another look."""
+    """After the bake, another one, opened again, in another folder, and shown with another look."""
     assert notes() == []
+    bake()
+    assert notes() == []
+    save(baked)
     bpy.ops.wm.open_mainfile(filepath=str(baked))
     assert notes() == []
     moved = shutil.copytree(baked.parent, baked.parent.parent / "moved")
@@ -240,3 +243,19 @@ def test_lights_of_a_relit_bake_may_have_other_strengths(room: Path) -> None:
     bpy.context.view_layer.update()
     (note,) = notes()
     assert note.startswith("changed since the last bake: 'Lamp'; ")
+
+
+def test_what_a_bake_of_changed_objects_leaves_is_still_named(room: Path) -> None:
+    bpy.context.scene.radiosity_relight.keep = False  # a kept bake would be updated for what moved
+    bpy.data.objects["Wall"].radiosity_mode = "LIGHT_ONLY"
+    bake()
+    bpy.data.objects["Wall"].location.y += 0.2
+    bpy.data.objects["Cube"].location.x += 0.1
+    bpy.context.view_layer.update()
+    bpy.context.scene.radiosity.scope = "changed"
+    bake()
+    (note,) = notes()
+    assert note.startswith("changed since the last bake: 'Wall'; ")
+    bpy.context.scene.radiosity.scope = "all"
+    bake()
+    assert notes() == []

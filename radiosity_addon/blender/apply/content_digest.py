@@ -56,6 +56,10 @@ _STRUCTS = StructReader(
 )
 
 
+_UNREADABLE = (AttributeError, KeyError, RecursionError, RuntimeError, TypeError, ValueError)
+"""What structs of a later Blender, or of an add-on, may raise: no bake fails for them."""
+
+
 def content_digest() -> str | None:
     """Return the digest of the open file, also of what it links; None where it cannot be known.
 
@@ -67,7 +71,7 @@ def content_digest() -> str | None:
     try:
         for text in _contents():
             found.update(text.encode("utf-8", "surrogatepass"))
-    except RecursionError:  # a struct of a later Blender, or of an add-on, that holds itself
+    except _UNREADABLE:
         return None
     return found.hexdigest()
 

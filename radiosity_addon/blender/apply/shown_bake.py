@@ -67,6 +67,11 @@ def remember_content(scene: bpy.types.Scene) -> None:
     scene.radiosity.baked_content = content_digest() or ""
 
 
+def forget_content(scene: bpy.types.Scene) -> None:
+    """Note that the scene must be compared with its bake."""
+    scene.radiosity.property_unset("baked_content")
+
+
 def is_as_remembered(scene: bpy.types.Scene) -> bool:
     """Return whether the file holds what it held when it was last known that nothing was edited."""
     content = scene.radiosity.baked_content

@@ -22,7 +22,7 @@ from ..apply.apply import apply_steps
 from ..apply.rebake import EarlierBake, replacing_earlier
 from ..apply.restore import restore
 from ..apply.scopes import files_shown_by, keeping_theirs, of_scene
-from ..apply.shown_bake import remember, remember_content
+from ..apply.shown_bake import forget_content, remember, remember_content
 from ..datablocks.bake_record import remove_datablocks
 from ..files.output import OutputFolder
 from ..files.saved_files import save_copy
@@ -145,13 +145,13 @@ def finish(
         folder = "" if output is None else "//" if copies else relative_path(output.path)
         last_bake.remember(scene, report.as_dict(), folder)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
-        remember_content(scene)
         if output is not None and copies is None:
             whole = report.joined(output.earlier, earlier.kept_sources)
             lightmap_versions.publish(output, _with_sidecar(whole, output, keeping))
         elif output is not None and copies is not None:
             undo.pop_all().close()  # the copy is to hold nothing of the earlier bake
             undo.enter_context(_restored_on_failure(context))
+            remember_content(scene)
             yield Status("save", applying(copies)[1])
             with timed(seconds, "save"):
                 save_copy(output)
@@ -163,6 +163,9 @@ def finish(
             report = output.write_report(_with_sidecar(report, output, keeping))
             yield Status("write", 1.0)
             output.publish()
+    if copies is None:
+        # What was there before has gone by now. Objects that keep theirs may have been edited before.
+        (forget_content if scope is not None and scope.keep else remember_content)(scene)
     if keeping is not None and kept is not None:
         kept_bakes.put(scene, keeping.mark, kept)
     kept_bakes.make_room()
