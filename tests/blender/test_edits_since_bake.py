@@ -259,3 +259,27 @@ def test_what_a_bake_of_changed_objects_leaves_is_still_named(room: Path) -> Non
     bpy.context.scene.radiosity.scope = "all"
     bake()
     assert notes() == []
+
+
+def test_scenes_are_compared_with_bakes_of_their_own(room: Path, reads: list[object]) -> None:
+    first, second = bpy.context.scene, bpy.data.scenes.new("Second")
+    bake()
+    bpy.context.window.scene = second
+    floor = bpy.data.objects["Floor"].copy()
+    floor.data = floor.data.copy()
+    second.collection.objects.link(floor)
+    lamp = bpy.data.objects["Lamp"].copy()
+    lamp.data = lamp.data.copy()
+    second.collection.objects.link(lamp)
+    second.radiosity.resolution, second.radiosity.quality = 16, "draft"
+    for energy in (20.0, 40.0):
+        lamp.data.energy = energy
+        bake()
+        assert notes() == []
+    assert not reads
+    bpy.context.window.scene = first
+    assert notes() == []
+    assert len(reads) == 1, "the file holds more now"
+    bpy.data.lights["Lamp"].energy = 1.0
+    (note,) = notes()
+    assert note.startswith("changed since the last bake: 'Lamp'; ")

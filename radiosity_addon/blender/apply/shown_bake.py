@@ -39,9 +39,18 @@ def shown_bake(scene: bpy.types.Scene, export: Export) -> ShownBake | None:
 
 
 def remember(
-    scene: bpy.types.Scene, export: Export, result: BakeResult, digests: BakeDigests, settings: BakeSettings
+    scene: bpy.types.Scene,
+    export: Export,
+    result: BakeResult,
+    digests: BakeDigests,
+    settings: BakeSettings,
+    *,
+    is_partial: bool = False,
 ) -> None:
-    """Note on every object what it was baked as, and on the scene which objects and lights there were."""
+    """Note on every object what it was baked as, and on the scene which objects and lights there were.
+
+    is_partial: Whether objects keep earlier lightmaps, which show the lights of before.
+    """
     sources = {
         target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     }
@@ -57,6 +66,8 @@ def remember(
     scene.radiosity.baked_light = digests.light
     short = {name: digest[:SHORT] for name, digest in digests.objects.items()}
     scene.radiosity.baked_objects = json.dumps(short)
+    if is_partial and scene.radiosity.baked_lights:
+        return
     read_by = {name: getattr(settings, name) for name in _READ_BY}
     lights = light_summaries(export.bake_scene)
     scene.radiosity.baked_lights = json.dumps({"settings": read_by, "lights": lights})

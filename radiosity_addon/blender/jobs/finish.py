@@ -141,7 +141,8 @@ def finish(
             result = replace(result, warnings=(*warnings, *result.warnings))
         # A copy remembers its bake too; the time that is left to do is not in its figures.
         report = _report(result, images, groups, settings, seconds)
-        remember(scene, export, result, digests, settings)
+        keeps_some = scope is not None and bool(scope.in_scene)
+        remember(scene, export, result, digests, settings, is_partial=keeps_some)
         folder = "" if output is None else "//" if copies else relative_path(output.path)
         last_bake.remember(scene, report.as_dict(), folder)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
@@ -165,7 +166,7 @@ def finish(
             output.publish()
     if copies is None:
         # What was there before has gone by now. Objects that keep theirs may have been edited before.
-        (forget_content if scope is not None and scope.keep else remember_content)(scene)
+        (forget_content if keeps_some else remember_content)(scene)
     if keeping is not None and kept is not None:
         kept_bakes.put(scene, keeping.mark, kept)
     kept_bakes.make_room()
