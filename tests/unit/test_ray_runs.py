@@ -9,6 +9,7 @@ from radiosity_addon.lightmap.points import GatherPoints, Interpolation
 from radiosity_addon.lightmap.texels import TexelGeometry, rasterize
 from radiosity_addon.lightmap.transport import GatherPointLayout
 from radiosity_addon.lightmap.transport.ray_runs import (
+    EVEN,
     MOST_RUNS,
     RUNS,
     noise_weights,
@@ -110,8 +111,8 @@ def test_rays_go_where_coarser_points_see_noise_and_are_no_more_in_all() -> None
     runs = runs_of(points, variance, chosen)
     x = geometry.position[chosen, 0]
     # Noise of 3 and 1, of which a quarter of the texels has the first: a mean of 1.5.
-    assert runs[x < 0.2].mean() == pytest.approx(RUNS * (0.5 + 0.5 * 3.0 / 1.5), rel=0.03)
-    assert runs[x > 0.3].mean() == pytest.approx(RUNS * (0.5 + 0.5 * 1.0 / 1.5), rel=0.03)
+    assert runs[x < 0.2].mean() == pytest.approx(RUNS * (EVEN + (1.0 - EVEN) * 3.0 / 1.5), rel=0.03)
+    assert runs[x > 0.3].mean() == pytest.approx(RUNS * (EVEN + (1.0 - EVEN) * 1.0 / 1.5), rel=0.03)
     assert runs.mean() == pytest.approx(RUNS, rel=0.02)
 
 

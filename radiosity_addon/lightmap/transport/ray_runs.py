@@ -24,7 +24,7 @@ RUNS = 2
 MOST_RUNS = 16
 """No point takes more."""
 
-EVEN = 0.5
+EVEN = 0.25
 """This part of the rays is for all points alike; the others are in proportion to the noise expected."""
 
 GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
