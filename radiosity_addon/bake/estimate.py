@@ -46,7 +46,7 @@ RAYS = {"sketch": 0.35, "draft": 0.55, "medium": 1.0, "high": 2.2}
 SECONDS_A_RAY = 0.9e-6
 """On two cores, with all that is done with what a ray meets."""
 
-SOLVE_SECONDS = {"sketch": 0.055, "draft": 0.08, "medium": 0.12, "high": 0.3}
+SOLVE_SECONDS = {"sketch": 0.055, "draft": 0.07, "medium": 0.07, "high": 0.07}
 """Time to solve a scene of one triangle; others by the number of triangles to the power 0.45."""
 
 UNWRAP_SECONDS, KEPT_SECONDS = 25e-6, 3e-6

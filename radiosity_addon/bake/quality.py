@@ -19,6 +19,10 @@ class Quality:
     gather: GatherSettings
 
 
+FINE_ENOUGH = 1e-3
+"""BF_ε of all qualities from draft on: with smaller ones lightmaps do not change by more than their noise
+(docs/decisions/0062); power is kept within 0.5 %."""
+
 QUALITY_SETTINGS = {
     "sketch": Quality(
         SolverSettings(
@@ -35,7 +39,7 @@ QUALITY_SETTINGS = {
     "draft": Quality(
         SolverSettings(
             shadow_rays=4,
-            error=1e-3,
+            error=FINE_ENOUGH,
             min_area=1e-4,
             form_factor_error=0.02,
             elements=500,
@@ -47,7 +51,7 @@ QUALITY_SETTINGS = {
     "medium": Quality(
         SolverSettings(
             shadow_rays=8,
-            error=1e-4,
+            error=FINE_ENOUGH,
             min_area=2e-5,
             form_factor_error=0.01,
             elements=1500,
@@ -59,7 +63,7 @@ QUALITY_SETTINGS = {
     "high": Quality(
         SolverSettings(
             shadow_rays=16,
-            error=3e-5,
+            error=FINE_ENOUGH,
             min_area=1e-5,
             form_factor_error=0.002,
             elements=4000,
@@ -106,7 +110,7 @@ def for_error(error: float) -> Quality:
     rays = min(max(between(low.gather.rays, high.gather.rays), FEWEST_RAYS), MOST_RAYS)
     solver = replace(
         low.solver,
-        error=min(max(between(low.solver.error, high.solver.error), 1e-5), COARSEST.solver.error),
+        error=min(between(low.solver.error, high.solver.error), COARSEST.solver.error),
         min_area=min(max(between(low.solver.min_area, high.solver.min_area), 5e-6), COARSEST.solver.min_area),
         shadow_rays=round(min(max(between(low.solver.shadow_rays, high.solver.shadow_rays), 2), 64)),
     )

@@ -100,13 +100,10 @@ class ElementTransport:
         if relit.power <= 0.0:
             relit.irradiance = lights
             return lights
-        links, scale, received = state.links, None, None
-        if state.balance is not None:
-            links, scale, received = state.balance.links, state.balance.sent, state.balance.received
         least, mixer = emission[leaves], Anderson(area)
         for _ in range(MAX_ITERATIONS):
             before = relit.radiosity[leaves]
-            bounce(relit, links, lights, scale, relit.cluster_links, relit.cut, received)
+            bounce(relit, state.links, lights, state.sent, relit.cluster_links, relit.cut)
             if relit.residual < state.settings.tolerance:
                 break
             relit.radiosity[leaves] = np.maximum(mixer.next(before, relit.radiosity[leaves]), least)

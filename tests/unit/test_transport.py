@@ -192,13 +192,11 @@ def test_the_solution_is_a_fixed_point(state: HierarchicalState) -> None:
     hierarchy = state.hierarchy
     assert len(state.cluster_links) > 0
     leaves = hierarchy.leaves
-    scale, received = state.balance.sent, state.balance.received
-    gathered = gather(hierarchy, state.balance.links, state.radiosity, scale)
-    own = gathered.mean(axis=1)
+    scale = state.sent
+    gathered = gather(hierarchy, state.links, state.radiosity, scale)
     sent = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * state.radiosity))
     at_faces = np.maximum(gather_at_clusters(hierarchy, state.cut, state.cluster_links, sent), 0.0)
-    shared = push(hierarchy, gathered) - own + at_faces[hierarchy.face]
-    arriving = received[:, :1] * own + received[:, 1:] * shared
+    arriving = push(hierarchy, gathered) + at_faces[hierarchy.face]
     faces = hierarchy.face[leaves]
     again = hierarchy.faces.emission[faces] + hierarchy.faces.reflectance[faces] * arriving[leaves]
     change = hierarchy.area[leaves] @ np.abs(again - state.radiosity[leaves])

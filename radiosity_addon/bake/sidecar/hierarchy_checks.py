@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...scene import Faces
-from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport
 from ...solver.gather import MOST_TINT
 from ...solver.hierarchy import LEAF, Clusters, Hierarchy
@@ -36,14 +35,11 @@ def check_elements(transport: ElementTransport, lights: int, triangles: int) -> 
     hierarchy = instance(state.hierarchy, Hierarchy)
     _check_hierarchy(hierarchy, triangles)
     clusters, count = len(hierarchy.clusters), hierarchy.n_elements
-    if state.balance is not None:
-        balance = instance(state.balance, Balance)
-        numbers(balance.sent, (count, 2), 0.0)
-        numbers(balance.received, (count, 2), 0.0)
-        _check_links(instance(balance.links, Links), clusters, count)
+    if state.sent is not None:
+        numbers(state.sent, (count, 2), 0.0)
     _check_links(instance(state.links, Links), clusters, count)
     links = instance(state.cluster_links, ClusterLinks)
-    require(len(links) == 0 or state.balance is not None, "links to clusters without a balance")
+    require(len(links) == 0 or state.sent is not None, "links to clusters without factors")
     _check_cluster_links(links, clusters, count)
     of_lights = instance(transport.light_links, LightLinks)
     integers(of_lights.receiver, (len(of_lights.receiver),), 0, count - 1)

@@ -29,12 +29,11 @@ from ...lightmap.transport import (
 from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
 from ...options import BakeSettings
 from ...scene import BakeScene, Faces
-from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport, Relightable
 from ...solver.emitters import EmitterGroup, LightSources
 from ...solver.gather import AimedRays, LightGains, LocalPass
 from ...solver.hierarchy import Clusters, Hierarchy
-from ...solver.links import ClusterLinks, LightLinks, Links, no_links
+from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
 from ..levels import with_levels
@@ -45,7 +44,7 @@ from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest,
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
-MAGIC, FORMAT = b"RADIOSITYRELIGHT", 5
+MAGIC, FORMAT = b"RADIOSITYRELIGHT", 6
 """The format rises with every change of the stored fields (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
@@ -54,7 +53,7 @@ OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
 STORED_CLASSES: tuple[type, ...] = (
     *(PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch),
     *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
-    *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks, Balance),
+    *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks),
     *(RelightableTexels, TexelTransport, GatherLinks, AimedRays, Interpolation, SubCells, SubCellLinks),
     *(LightGains, WarmStart, Smoothing, TexelGeometry, Seams),
 )
@@ -137,10 +136,6 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) 
     BakeError
         If the file cannot be written.
     """
-    elements = kept.solved.elements
-    if elements.state.balance is not None:
-        # Balanced links stand for those that were measured.
-        elements = replace(elements, state=replace(elements.state, links=no_links()))
     stored = {
         "bake_id": bake_id,
         "settings": asdict(kept.settings),
@@ -149,7 +144,7 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) 
         "of_sources": {name: getattr(kept.bake_scene, name) for name in OF_SOURCES},
         "pages": [item.page for item in result.objects if item.object.level is None],
         "report": {"solver": {**result.solver, "history": []}, "atlas": result.atlas},
-        "elements": elements,
+        "elements": kept.solved.elements,
         "lit": replace(kept.lit, warm_start=kept.lit.warm_start.first()),
         "geometry": kept.geometry,
         "seams": kept.seams,
@@ -198,8 +193,7 @@ def read_sidecar(path: Path, memory_limit: float | None = None) -> StoredBake:
 def _solved(elements: ElementTransport) -> Relightable:
     """Make what is not stored of a solved scene that was read and checked."""
     state = elements.state
-    if state.balance is not None:
-        state.links = state.balance.links
+    if state.sent is not None:
         state.cut = state.linked_cut()
     return Relightable(elements.sources, elements, LocalPass.of(state, elements.sources))
 

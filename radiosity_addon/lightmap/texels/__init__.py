@@ -6,7 +6,6 @@ No light yet.
 from __future__ import annotations
 
 from .cells import TexelCells
-from .nearest_uncut import whole_neighbor
 from .occlusion import Crossings, below_hood, find_crossings
 from .rasterization import FOOTPRINT, coverage_sum, rasterize
 from .shared_texels import is_collapsed, texel_areas
@@ -36,5 +35,4 @@ __all__ = [
     "texel_areas",
     "texel_materials",
     "uneven_texels",
-    "whole_neighbor",
 ]

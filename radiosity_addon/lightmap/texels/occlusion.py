@@ -17,9 +17,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, fill_chunks, row_numbers
+from ...numerics import Array, fill_chunks
 from ...rays import SIGHT_LIFT, RayCaster
-from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
@@ -109,21 +108,22 @@ def find_crossings(
     """
     if before is None or again is None:
         result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
-        clear = clear_texels(geometry, OUTSET, HOOD, SIGHT_LIFT * caster.surface_offset, threads)
-        doubted = row_numbers(~clear)
+        rows = None
     else:
         were = (before.cut, before.touched, before.rim, before.occluded)
-        result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), again
+        result, rows = Crossings(geometry, *(flags.copy() for flags in were)), again
 
     into = (result.cut, result.touched, result.rim, result.occluded)
-    find = partial(_find, geometry, caster, doubted)
-    fill_chunks(find, into, len(doubted), CHUNK, threads, progress, at=doubted)
+    find = partial(_find, geometry, caster, rows)
+    fill_chunks(find, into, len(geometry) if rows is None else len(rows), CHUNK, threads, progress, at=rows)
     return result
 
 
-def _find(geometry: TexelGeometry, caster: RayCaster, doubted: Array, part: slice) -> tuple[Array, ...]:
-    """Return which texels are cut, touched, at a rim and occluded."""
-    rows = doubted[part]
+def _find(
+    geometry: TexelGeometry, caster: RayCaster, tested: Array | None, part: slice
+) -> tuple[Array, ...]:
+    """Return which texels are cut, touched, at a rim and occluded: of all texels, or of those `tested`."""
+    rows = np.arange(part.start, part.stop) if tested is None else tested[part]
     lift = SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
     # Of the texel on the page: hits land on the part outside its triangle as well.
     square = geometry.squares(rows) + lift

@@ -16,7 +16,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass, values_of
-from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbor
+from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood
 
 WIDE_TEXEL = 4.0
 """Texels this many times wider than the median show less detail than leaf elements that are smaller."""
@@ -72,7 +72,7 @@ class HitTable:
         part = self.texel_cells.at(texel[close], hits.take(close))
         found[close] = np.where(part == NOTHING, texel[close], part + self.first_cell)
         without = divided[cell == NOTHING]
-        found[without] = self._neighbor(texel[without], hits.take(without))
+        found[without] = self._without_cell(texel[without], hits.take(without))
         large = np.flatnonzero((found >= 0) & self._wide[hits.triangle])
         finer = elements.leaf_areas(hits.take(large)) < geometry.texel_area[hits.triangle[large]]
         found[large[finer]] = NO_TEXEL
@@ -82,15 +82,14 @@ class HitTable:
         found[elsewhere] = np.where(cell == NOTHING, NOTHING, cell + self.texel_count)
         return found
 
-    def _neighbor(self, texel: Array, hits: Hits) -> Array:
-        """Return (h,) what answers hits on texels without a cell for them: a neighbor, or NO_TEXEL.
+    def _without_cell(self, texel: Array, hits: Hits) -> Array:
+        """Return (h,) what answers hits on texels without a cell for them: NO_TEXEL, thus an element.
 
         NOTHING below a hood: elements do not know of hoods, and their light would be that of the open.
         """
-        caster, position = self.local.caster, self.geometry.positions_of(hits)
-        below = below_hood(self.geometry, caster, texel, position[:, None])[:, 0]
-        found = whole_neighbor(self.crossings, caster, texel, position, below)
-        return np.where((found == NOTHING) & ~below, NO_TEXEL, found)
+        position = self.geometry.positions_of(hits)[:, None]
+        below = below_hood(self.geometry, self.local.caster, texel, position)[:, 0]
+        return np.where(below, NOTHING, NO_TEXEL)
 
     def _sees_center(self, texel: Array, hits: Hits) -> Array:
         """Return (h,) whether nothing is between hits and the centers of their texels."""

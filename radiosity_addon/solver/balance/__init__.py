@@ -1,14 +1,11 @@
-"""Conservation of light: every leaf sends exactly the light it has.
-
-Corrects visibilities that rays only estimate.
-"""
+"""Conservation of light: every leaf sends exactly the light it has."""
 
 from __future__ import annotations
 
-from .conservation import Balance, Conservation, received_by_faces
+from .conservation import Conservation
+from .link_sums import received_by_faces
 
 __all__ = [
-    "Balance",
     "Conservation",
     "received_by_faces",
 ]

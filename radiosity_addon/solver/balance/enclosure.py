@@ -13,16 +13,13 @@ import numpy as np
 from ...numerics import Array, Stream, cosine_hemisphere, fill_chunks, stratified_square, to_world
 from ...rays import RayCaster
 from ..hierarchy import ClusterCut, Hierarchy
-from ..links import node_samples, pull
+from ..links import node_samples
 
 LEAF_RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
 
 EMISSIVE_LEAF_RAYS = 512
 """Rays of an emissive leaf, where not all of the others arrive: most power starts there."""
-
-HELD_RAYS = 128
-"""Rays of other leaves of which none escapes, but some end on black backs."""
 
 SPREAD_RAYS = 1 << 17
 """Total number of rays, by area, where not all arrive: each of a few large leaves carries much light …"""
@@ -41,21 +38,18 @@ class Arrivals:
     """Stores the share of each leaf's light that arrives, as leaves appear.
 
     share (e,): Of leaves, what part of their light arrives; of those that never were leaves NaN.
-    escapes (e,) bool: Whether any ray left the scene.
     rays (e,) int32: How many were traced.
     """
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
         self._caster, self._min_area, self._seed, self._threads = caster, min_area, seed, threads
         self.share = np.zeros(0)
-        self.escapes = np.zeros(0, dtype=bool)
         self.rays = np.zeros(0, dtype=np.int32)
 
     def measure(self, hierarchy: Hierarchy) -> None:
         """Trace the rays of leaves that are new."""
         more = hierarchy.n_elements - len(self.share)
         self.share = np.concatenate([self.share, np.full(more, np.nan)])
-        self.escapes = np.concatenate([self.escapes, np.zeros(more, dtype=bool)])
         self.rays = np.concatenate([self.rays, np.full(more, LEAF_RAYS, dtype=np.int32)])
         leaves = hierarchy.leaves
         new = leaves[np.isnan(self.share[leaves])]
@@ -64,9 +58,9 @@ class Arrivals:
             # Neighbors that together are no larger than an element may be share their rays.
             large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
             cut = ClusterCut(hierarchy, large)
-            share, escapes = self._trace(hierarchy, cut.nodes, LEAF_RAYS)
+            share = self._trace(hierarchy, cut.nodes, LEAF_RAYS)
             node = cut.row_of_face[faces] - cut.n_inner
-            self.share[faces], self.escapes[faces] = share[node], escapes[node]
+            self.share[faces] = share[node]
             apart = faces[(share[node] > 0.0) & (share[node] < 1.0) & (np.bincount(node)[node] > 1)]
             if len(apart) * LEAF_RAYS <= MOST_RAYS:
                 self._ask(hierarchy, apart, LEAF_RAYS)
@@ -88,8 +82,6 @@ class Arrivals:
         large = hierarchy.area[leaves] >= self._min_area
         shines = hierarchy.emission[leaves].any(axis=1)
         rays[large & shines] = np.maximum(rays[large & shines], EMISSIVE_LEAF_RAYS)
-        held = large & ~shines & ~self.escapes[leaves]
-        rays[held] = np.maximum(rays[held], HELD_RAYS)
         return np.asarray(rays)
 
     def error(self, leaves: Array) -> Array:
@@ -97,38 +89,23 @@ class Arrivals:
         share = self.share[leaves]
         return np.asarray(np.sqrt(share * (1.0 - share) / self.rays[leaves]))
 
-    def of_faces(self, hierarchy: Hierarchy) -> tuple[Array, Array, Array]:
-        """Return the results for faces, after `measure`.
-
-        Returns share, error (f,): The part of their light that arrives, and its standard error.
-        Returns escapes (f,) bool.
-        """
-        leaves, count = hierarchy.leaves, len(hierarchy.faces)
-        spread = np.zeros((hierarchy.n_elements, 2))
-        spread[leaves, 0] = self.share[leaves]
-        spread[leaves, 1] = self.escapes[leaves]
-        means = pull(hierarchy, spread)[:count]
-        rays = np.bincount(hierarchy.face[leaves], self.rays[leaves], count)
-        share = np.where(means[:, 0] > 1.0 - 1e-12, 1.0, means[:, 0])
-        return share, np.sqrt(share * (1.0 - share) / rays), means[:, 1] > 0.0
-
     def _ask(self, hierarchy: Hierarchy, leaves: Array, rays: int) -> None:
         """Trace a number of rays of each of these leaves."""
-        self.share[leaves], self.escapes[leaves] = self._trace(hierarchy, hierarchy.n_clusters + leaves, rays)
+        self.share[leaves] = self._trace(hierarchy, hierarchy.n_clusters + leaves, rays)
         self.rays[leaves] = rays
 
-    def _trace(self, hierarchy: Hierarchy, nodes: Array, rays: int) -> tuple[Array, Array]:
-        """Return (n,) the share of the light of nodes that arrives, and whether any ray leaves the scene."""
-        share, escapes = np.empty(len(nodes)), np.empty(len(nodes), dtype=bool)
+    def _trace(self, hierarchy: Hierarchy, nodes: Array, rays: int) -> Array:
+        """Return (n,) the share of the light of nodes that arrives."""
+        share = np.empty(len(nodes))
         measure = partial(_arriving, hierarchy, self._caster, nodes, rays, self._seed)
-        fill_chunks(measure, (share, escapes), len(nodes), CHUNK * LEAF_RAYS // rays, self._threads)
-        return share, escapes
+        fill_chunks(measure, share, len(nodes), CHUNK * LEAF_RAYS // rays, self._threads)
+        return share
 
 
 def _arriving(
     hierarchy: Hierarchy, caster: RayCaster, nodes: Array, rays: int, seed: int, rows: slice
-) -> tuple[Array, Array]:
-    """Return (r,) the share of the light of nodes that arrives, and whether any ray leaves the scene."""
+) -> Array:
+    """Return (r,) the share of the light of nodes that arrives."""
     faces, chosen = hierarchy.faces, nodes[rows]
     quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
     streams = Stream.ENCLOSURE_POINTS, Stream.ENCLOSURE_FACE
@@ -139,9 +116,8 @@ def _arriving(
     start = points.reshape(-1, 3) + caster.surface_offset * normals
     if faces.has_black_backs:
         hits = caster.intersect(start, directions)
-        missed = hits.triangle < 0
-        lost = missed | (faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0)
+        black = faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0
+        lost = (hits.triangle < 0) | black
     else:
         lost = caster.passing(start, directions, np.full(len(start), np.inf))
-        missed = lost > 0
-    return 1.0 - lost.reshape(-1, rays).mean(axis=1), missed.reshape(-1, rays).any(axis=1)
+    return np.asarray(1.0 - lost.reshape(-1, rays).mean(axis=1))

@@ -1,4 +1,4 @@
-"""Sums of what leaves receive and send, over their own links and over those they share.
+"""Sums of what leaves send over their own links and over those they share, and of what faces receive.
 
 A leaf hears the links of its ancestors and of the clusters above it besides its own, and is heard
 over theirs. Both sums are 1 where nothing escapes, if the links are right (`conservation`).
@@ -18,22 +18,19 @@ from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radios
 class ClusterLinkLight:
     """Light that the receivers of links to clusters take, times opacity, per unit of the source's radiosity.
 
-    received (e, 2): What the leaves' gathered light is scaled with.
     power (l,): Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
     area (l,): Σ A_f a_f [m²]
     """
 
-    def __init__(
-        self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks, received: Array | None
-    ) -> None:
+    def __init__(self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
-        if received is None and (hierarchy.opacity == 1.0).all():
+        if (hierarchy.opacity == 1.0).all():
             self.area = clusters.area[links.receiver]
             self.power = self.area * links.factor * links.visibility
             return
         channels = []
         for opacity, tint in _opacity_of_channels(hierarchy, links.tint):
-            weight = (_taken_below(hierarchy, opacity, received)[: len(faces)] * faces.area)[:, None]
+            weight = (opacity[: len(faces)] * faces.area)[:, None]
             sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.center], axis=1))
             at = sums[cut.row[links.receiver]]
             offset = at[:, 4:] - at[:, :1] * clusters.center[links.receiver]
@@ -44,49 +41,33 @@ class ClusterLinkLight:
 
 
 def sent_by_leaves(
-    hierarchy: Hierarchy,
-    cut: ClusterCut,
-    links: Links,
-    cluster_links: ClusterLinks,
-    received: Array | None = None,
+    hierarchy: Hierarchy, cut: ClusterCut, links: Links, cluster_links: ClusterLinks
 ) -> tuple[Array, Array]:
     """Return the shares of leaves' light that own links, and those of ancestors and clusters, carry.
 
-    received (e, 2): What the leaves' gathered light is scaled with.
     Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
-    at_links = taken_at_links(hierarchy, links, received)
+    at_links = taken_at_links(hierarchy, links)
     sums = sent(hierarchy, links, at_links)
     own = quarters_mean(sums)[:, 0]
-    at_clusters = ClusterLinkLight(hierarchy, cut, cluster_links, received)
+    at_clusters = ClusterLinkLight(hierarchy, cut, cluster_links)
     sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
     from_clusters = _from_clusters(hierarchy, cut, links, at_links, cluster_links, at_clusters)
     return own, push(hierarchy, sums + from_clusters)[:, 0] - own
 
 
-def received_by_leaves(
+def received_by_faces(
     hierarchy: Hierarchy, cut: ClusterCut, links: Links, cluster_links: ClusterLinks, scale: Array
-) -> tuple[Array, Array]:
-    """Return ΣFV over own links, and over those of ancestors and clusters, sources scaled by `scale`.
-
-    Returns own, shared (e,): Of the leaves; other rows mean nothing.
-    """
-    # Of colors the mean: what passes glass is relative to what it finds behind it.
-    gathered = gather(hierarchy, links, hierarchy.opacity_by_channel, scale, cut)
-    own = quarters_mean(gathered).mean(axis=1)
-    shared = push(hierarchy, gathered).mean(axis=1) - own
-    if len(cluster_links):
-        shared += received_over_clusters(hierarchy, cut, cluster_links, scale)[hierarchy.face]
-    return own, shared
-
-
-def received_over_clusters(
-    hierarchy: Hierarchy, cut: ClusterCut, cluster_links: ClusterLinks, scale: Array
 ) -> Array:
-    """Return (f,) ΣFV over links to clusters, sources scaled by `scale`."""
-    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity_by_channel), cut)
-    gathered = gather_at_clusters(hierarchy, cut, cluster_links, means)
-    return np.asarray(np.maximum(gathered.mean(axis=1), 0.0))
+    """Return (f,) ΣFV over each face's, its elements' and its clusters' links, sources scaled by `scale`."""
+    # Of colors the mean: what passes glass is relative to what it finds behind it.
+    gathered = push(hierarchy, gather(hierarchy, links, hierarchy.opacity_by_channel, scale, cut))
+    received = pull(hierarchy, gathered.mean(axis=1, keepdims=True))[: len(hierarchy.faces), 0]
+    if len(cluster_links):
+        means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity_by_channel), cut)
+        over_clusters = gather_at_clusters(hierarchy, cut, cluster_links, means).mean(axis=1)
+        received += np.maximum(over_clusters, 0.0)
+    return np.asarray(received)
 
 
 def _from_clusters(
@@ -131,22 +112,17 @@ def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Cluste
     return np.bincount(element, power / hierarchy.area[element], hierarchy.n_elements)[:, None, None]
 
 
-def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = None) -> Array:
-    """Return (l,) A_r F_rs V_rs [m²] of links to elements, with A_r the opaque area of the receiver.
-
-    received (e, 2): What the light that leaves gather is scaled with, as from `Conservation.balance`.
-    """
+def taken_at_links(hierarchy: Hierarchy, links: Links) -> Array:
+    """Return (l,) A_r F_rs V_rs [m²] of links to elements, with A_r the opaque area of the receiver."""
     child = hierarchy.first_child[links.receiver]
     inner = np.flatnonzero(child != LEAF)
     channels = []
     for opacity, tint in _opacity_of_channels(hierarchy, links.tint):
-        there = opacity if received is None else opacity * received[:, 0]
-        below = _taken_below(hierarchy, opacity, received)
-        share = there[links.receiver]
+        share = opacity[links.receiver]
         # Quarters take unequal parts of what arrives, and may be covered: each is weighted by what it takes.
         share[inner] = 0.0
         for quarter in range(4):
-            share[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
+            share[inner] += 0.25 * links.to_quarter[inner, quarter] * opacity[child[inner] + quarter]
         channels.append((tint * share,))
     (share,) = _mean_of(channels)
     return np.asarray(hierarchy.area[links.receiver] * share * links.factor * links.visibility)
@@ -165,13 +141,6 @@ def _mean_of(channels: Sequence[tuple[Array, ...]]) -> tuple[Array, ...]:
     if len(channels) == 1:
         return channels[0]
     return tuple(np.mean(values, axis=0) for values in zip(*channels, strict=True))
-
-
-def _taken_below(hierarchy: Hierarchy, opacity: Array, received: Array | None) -> Array:
-    """Return (e,) the part of their ancestors' light that leaves take, times their opacity (e,)."""
-    if received is None:
-        return opacity
-    return np.asarray(pull(hierarchy, opacity[:, None] * received[:, 1:])[:, 0])
 
 
 def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
-from ..balance import Balance, Conservation, received_by_faces
+from ..balance import Conservation, received_by_faces
 from ..hierarchy import ClusterCut, NodeShapes
 from ..links import (
     ClusterLinks,
@@ -76,7 +76,7 @@ each other, that keeps the residual from falling, or would let plain iteration g
 class HierarchicalState(SolverState):
     """State of the refined hierarchy."""
 
-    STORED = ("settings", "hierarchy", "links", "cluster_links", "balance")
+    STORED = ("settings", "hierarchy", "links", "cluster_links", "sent")
 
     links: Links = field(default_factory=no_links)
     """To elements, sorted by receiver."""
@@ -86,8 +86,8 @@ class HierarchicalState(SolverState):
     cut: ClusterCut | None = None
     """The clusters that the links use."""
     conservation: Conservation | None = None
-    balance: Balance | None = None
-    """The links and factors by which light was exchanged at the end."""
+    sent: Array | None = None
+    """(e, 2) What leaves' radiosity is scaled with over links at the end (`Conservation.factors`)."""
 
     @property
     def n_links(self) -> int:
@@ -105,9 +105,9 @@ class HierarchicalState(SolverState):
 
     def balanced_closure(self) -> Array:
         """Return (f,) ΣFV of the light exchange at the end, scaled (see `conservation`)."""
-        if self.balance is None or self.cut is None:
+        if self.sent is None or self.cut is None:
             return self.closure()
-        return received_by_faces(self.hierarchy, self.cut, self.balance, self.cluster_links)
+        return received_by_faces(self.hierarchy, self.cut, self.links, self.cluster_links, self.sent)
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> HierarchicalState:
@@ -233,22 +233,19 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     Each step yields the residual of the radiosity before it; that of the `last` one is measured
     for the radiosity that is left in the state.
     """
-    hierarchy, cluster_links = state.hierarchy, state.cluster_links
+    hierarchy, links, cluster_links = state.hierarchy, state.links, state.cluster_links
     assert state.conservation is not None  # set when the state was made
-    state.cut = state.balance = None  # as large as what replaces them
+    state.cut = state.sent = None  # as large as what replaces them
     lights = state.direct()
     state.cut = state.linked_cut()
-    state.balance = state.conservation.balance(
-        hierarchy, state.cut, state.links, cluster_links, rough=not last
-    )
-    cut, balance = state.cut, state.balance
-    links, scale, received = balance.links, balance.sent, balance.received
+    state.sent = state.conservation.factors(hierarchy, state.cut, links, cluster_links)
+    cut, scale = state.cut, state.sent
     leaves = hierarchy.leaves
     mixer = Anderson(hierarchy.area[leaves])
     best, best_at = np.inf, state.iterations
     while not exhausted(state):
         before = state.radiosity[leaves]
-        bounce(state, links, lights, scale, cluster_links, cut, received)
+        bounce(state, links, lights, scale, cluster_links, cut)
         state.note()
         if state.residual < 0.9 * best:
             best, best_at = state.residual, state.iterations
@@ -260,7 +257,7 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
         state.radiosity[leaves] = np.maximum(mixed, state.emission[leaves])
         del mixed
     if last:
-        _, after = reflect(state, links, lights, scale, cluster_links, cut, received)
+        _, after = reflect(state, links, lights, scale, cluster_links, cut)
         state.residual = relative_residual(state, after)
         state.history[-1:] = [replace(entry, residual=state.residual) for entry in state.history[-1:]]
 

@@ -13,7 +13,6 @@ from ..links import (
     gather_at_clusters,
     push,
     push_pull,
-    quarters_mean,
     shared_means,
 )
 from .state import SolverState
@@ -26,7 +25,6 @@ def reflect(
     scale: Array | None = None,
     cluster_links: ClusterLinks | None = None,
     cut: ClusterCut | None = None,
-    received: Array | None = None,
 ) -> tuple[Array, Array]:
     """Gather over all links from the state's radiosity, then push and pull; the state stays.
 
@@ -35,8 +33,6 @@ def reflect(
     scale (e, 2): See `transport.gather`.
     cluster_links: What the faces of clusters receive together.
     cut: With all clusters of both sets of links; needed for the second.
-    received (e, 2): What the light that leaves gather is scaled with, over own links and over shared ones
-        (`conservation`).
     Returns irradiance, radiosity (e, 3) [W/m²].
     """
     hierarchy = state.hierarchy
@@ -54,14 +50,6 @@ def reflect(
     if shared is not None:
         gathered += shared.take(hierarchy.face, axis=0)
         del shared
-    if received is not None:
-        # Only leaves count, and these have from their ancestors what is not their own.
-        of_leaves = quarters_mean(own)
-        gathered -= of_leaves
-        gathered *= received[:, 1:]
-        of_leaves *= received[:, :1]
-        gathered += of_leaves
-        del of_leaves
     del own
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
@@ -80,14 +68,13 @@ def bounce(
     scale: Array | None = None,
     cluster_links: ClusterLinks | None = None,
     cut: ClusterCut | None = None,
-    received: Array | None = None,
 ) -> None:
     """Move the state's irradiance and radiosity on by one step (see `reflect`), and count it.
 
     The step's change at the leaves is taken as the residual, that of the radiosity before.
     """
     state.irradiance = state.irradiance[:0]  # the step does not need it, and memory is short
-    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, cut, received)
+    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, cut)
     state.residual = relative_residual(state, radiosity)
     state.irradiance, state.radiosity = irradiance, radiosity
     state.iterations += 1

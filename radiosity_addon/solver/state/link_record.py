@@ -104,9 +104,7 @@ def record_links(state: SolverState) -> LinkRecord:
     """Keep the elements and links of a solved state; methods without links have those from lamps alone."""
     hierarchy = state.hierarchy
     clusters, faces = hierarchy.clusters, hierarchy.faces
-    balance = getattr(state, "balance", None)
-    sets = [getattr(state, "links", None) if balance is None else balance.links]
-    sets.append(getattr(state, "cluster_links", None))
+    sets = [getattr(state, "links", None), getattr(state, "cluster_links", None)]
     _, sent = shared_means(hierarchy, state.radiosity.mean(axis=1, keepdims=True))
     receiver, source, arriving = [], [], []
     for number, links in enumerate(sets):
