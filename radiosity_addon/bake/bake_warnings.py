@@ -24,7 +24,7 @@ MIN_SIDE = 8
 def small_objects(
     bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
 ) -> Iterator[BakeWarning]:
-    """Warn of objects that get hardly any texels, and of the one that takes nearly all, if there is one."""
+    """Warn of objects that get hardly any texels, the largest first, and of one that takes nearly all."""
     counts = geometry.counts
     texels = [int(counts[item.rows].sum()) for item in baked]
     greedy = greedy_object([item.name for item in baked], texels)
@@ -32,12 +32,12 @@ def small_objects(
     if greedy is not None:
         taken = share_of(max(texels), sum(texels))
         advice = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
-    for item, own in zip(baked, texels, strict=True):
-        surface = bake_scene.scene.areas[item.rows].sum()
-        if surface > 0 and own < MIN_SIDE**2:
+    surface = [float(bake_scene.scene.areas[item.rows].sum()) for item in baked]
+    for number in sorted(range(len(baked)), key=lambda number: -surface[number]):
+        name, own = baked[number].name, texels[number]
+        if surface[number] > 0 and own < MIN_SIDE**2:
             yield BakeWarning(
-                item.name,
-                f"object '{item.name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {advice}",
+                name, f"object '{name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {advice}"
             )
 
 

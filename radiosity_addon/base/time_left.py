@@ -96,12 +96,15 @@ class RemainingTime:
 
 
 def duration(seconds: float) -> str:
-    """Return a time as people say it, rounded up: '4 s', '25 s', '3 min', '1 h 10 min'."""
+    """Return a time as people say it, rounded up: '4 s', '25 s', '2 min 10 s', '8 min', '1 h 10 min'."""
     whole = max(math.ceil(seconds - 1e-6), 0)
     if whole > 10:
         whole = 5 * math.ceil(whole / 5)
     if whole < 60:
         return f"{whole} s"
+    if whole <= 300:
+        minutes, seconds = divmod(10 * math.ceil(whole / 10), 60)
+        return f"{minutes} min {seconds} s" if seconds else f"{minutes} min"
     minutes = math.ceil(whole / 60)
     if minutes < 60:
         return f"{minutes} min"

@@ -151,8 +151,10 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     lines.append(f"  {'total':<24} {sum(seconds.values()):7.2f} s")
     warnings = report["warnings"]
     if warnings:
-        lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}:")
-        lines += [f"  {warning['name']}: {warning['message']}" for warning in one_of_each(warnings)]
+        shown = one_of_each(warnings)
+        alike = f", {len(shown)} of them shown" if len(shown) < len(warnings) else ""
+        lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}{alike}:")
+        lines += [f"  {warning['name']}: {warning['message']}" for warning in shown]
     return lines
 
 

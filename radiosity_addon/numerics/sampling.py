@@ -45,7 +45,9 @@ def _avalanche(bits: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     return bits
 
 
-def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0) -> npt.NDArray[np.float32]:
+def stratified_square(
+    keys: npt.ArrayLike, k: int, seed: int = 0, first: npt.ArrayLike = 0
+) -> npt.NDArray[np.float32]:
     """Return k low-discrepancy points in the unit square for every key.
 
     The first two Sobol' dimensions, a (0,2)-sequence in base 2, shuffled and shifted by the
@@ -57,11 +59,11 @@ def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0
 
     keys (n,) non-negative integers: What each row is for, a texel's number, say. Equal keys get equal points.
     k: Points a row; powers of two stratify best.
-    first: Index of the first point.
+    first: Index of the first point, of all rows or (n,) of each.
     Returns u (n, k, 2) float32 in [0, 1).
     """
     rows = np.asarray(keys)
-    index = np.arange(first, first + k, dtype=np.uint32)
+    index = np.asarray(first, dtype=np.uint32)[..., None] + np.arange(k, dtype=np.uint32)
     low = index & np.uint32((1 << _TABLE_BITS) - 1)
     high = index - low
     order = _shuffle(_reversals()[low], hash_keys(rows, 3 * seed)[:, None])
@@ -111,8 +113,8 @@ def _reversed_table() -> npt.NDArray[np.uint32]:
 
 
 def _sobol_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
-    """Return the first two Sobol' dimensions of points `index` (k,) as (k, 2) binary fractions."""
-    bits = np.zeros((len(index), 2), dtype=np.uint32)
+    """Return the first two Sobol' dimensions of points `index` (…, k) as (…, k, 2) binary fractions."""
+    bits = np.zeros((*index.shape, 2), dtype=np.uint32)
     radical, pascal = 1 << 31, 1 << 31
     for digit in range(32):
         on = ((index >> np.uint32(digit)) & np.uint32(1)).astype(bool)

@@ -54,6 +54,6 @@ def test_the_console_counts_all_and_lists_one_of_each() -> None:
         "warnings": [*map(missing, range(84)), TOO_SMALL],
     }
     lines = summary("out", [], report)
-    start = lines.index("85 warnings:")
+    start = next(row for row, line in enumerate(lines) if line.startswith("85 warnings, "))
     assert len(lines[start + 1 :]) == 2
     assert lines[-1] == f"  map: {TOO_SMALL['message']}"

@@ -67,8 +67,11 @@ def test_noise_is_shared_where_light_is_even_and_an_edge_stays() -> None:
     truth = np.where(x < 0.5, 1.0, 3.0) * np.ones(3)
     sigma = 0.1
     noise, other = random.normal(0.0, sigma, (2, *truth.shape))
-    smoothing = choose_smoothing(geometry, alike, truth + noise, other)
-    error = smoothing(geometry, (truth + noise).astype(np.float32)) - truth
+    values = truth + noise
+    # In two parts: what counts is their sum.
+    smoothing, smoothed = choose_smoothing(geometry, alike, [0.25 * values, 0.75 * values], other)
+    error = smoothing(geometry, values.astype(np.float32)) - truth
+    np.testing.assert_allclose(smoothed[:, :3] + smoothed[:, 3:], error + truth, rtol=1e-5)
     even = np.abs(x[:, 0] - 0.5) > 0.25
     assert np.sqrt((error[even] ** 2).mean()) < 0.35 * sigma
     # Next to the edge the error may not be more than the noise was.
@@ -80,7 +83,7 @@ def test_what_has_no_noise_is_not_touched() -> None:
     geometry, caster = floor()
     alike = neighbors(geometry, caster)
     values = np.sin(7.0 * geometry.position).astype(np.float32)
-    smoothing = choose_smoothing(geometry, alike, values, np.zeros_like(values))
+    smoothing, _ = choose_smoothing(geometry, alike, [values], np.zeros_like(values))
     error = np.abs(smoothing(geometry, values) - values)
     assert error.max() < 1e-6
 
@@ -101,7 +104,10 @@ def test_threads_and_operators_are_the_same() -> None:
     alike = neighbors(geometry, caster)
     random = np.random.default_rng(3)
     values, noise = random.random((2, len(geometry), 3)).astype(np.float32)
-    one, two = (choose_smoothing(geometry, alike, values, noise, threads) for threads in (1, 2))
+    (one, smoothed), (two, _) = (
+        choose_smoothing(geometry, alike, [values], noise, threads) for threads in (1, 2)
+    )
     np.testing.assert_array_equal(one.passes, two.passes)
+    np.testing.assert_array_equal(one(geometry, values), smoothed)
     both = one(geometry, values + noise)
     np.testing.assert_allclose(both, one(geometry, values) + one(geometry, noise), rtol=1e-4, atol=1e-5)

@@ -38,8 +38,9 @@ from .preview import SAMPLES, render_preview
 BakeJob = Generator[Status, None, BakeReport]
 Shown = tuple[list[bpy.types.Image], GroupImages, tuple[BakeWarning, ...]]
 
-APPLYING = {False: (0.98, 1.0), True: (0.85, 0.89)}
-"""How far the whole is when applying begins and ends, without and with copies; rough, at medium quality."""
+SHOWN, COPIED, PREVIEWED = (0.98, 1.0), (0.96, 0.98), (0.85, 0.89)
+"""How far the whole is when applying begins and ends: without copies, with a copy of the file, and with a
+preview of it; rough, at medium quality."""
 
 PREVIEW = 0.92
 """How far it is when the preview begins."""
@@ -81,6 +82,13 @@ class Copies:
     """What is written next to the lightmaps: `baked.blend`, and `preview.png` unless `samples` is None."""
 
     samples: int | None = SAMPLES
+
+
+def applying(copies: Copies | None) -> tuple[float, float]:
+    """Return how far the whole bake is when applying begins and ends."""
+    if copies is None:
+        return SHOWN
+    return COPIED if copies.samples is None else PREVIEWED
 
 
 def finish(
@@ -129,7 +137,7 @@ def finish(
         with timed(seconds, "apply"):
             result = replace(result, warnings=(*earlier.warnings, *result.warnings))
             showing = _show(context, settings, export, result, output, keeping, earlier)
-            images, groups, warnings = yield from staged(showing, "apply", *APPLYING[copies is not None])
+            images, groups, warnings = yield from staged(showing, "apply", *applying(copies))
             result = replace(result, warnings=(*warnings, *result.warnings))
         # A copy remembers its bake too; the time that is left to do is not in its figures.
         report = _report(result, images, groups, settings, seconds)
@@ -143,7 +151,7 @@ def finish(
         elif output is not None and copies is not None:
             undo.pop_all().close()  # the copy is to hold nothing of the earlier bake
             undo.enter_context(_restored_on_failure(context))
-            yield Status("save", APPLYING[True][1])
+            yield Status("save", applying(copies)[1])
             with timed(seconds, "save"):
                 save_copy(output)
             if copies.samples is not None:

@@ -26,7 +26,7 @@ from ..relight import lightmap_versions
 from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
 from ..session.background import in_thread
-from .finish import APPLYING, BakeJob, Copies, Scope, finish
+from .finish import BakeJob, Copies, Scope, applying, finish
 from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
 
@@ -108,7 +108,7 @@ def run_bake(
                 yield Status("export", SOLVE)
         copies = Copies(SAMPLES if with_preview else None) if with_copy and output is not None else None
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
-        solved, _ = APPLYING[copies is not None]
+        solved, _ = applying(copies)
         baking = partial(run_pipeline, plan, keeping, sidecar)
         result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*warnings, *result.warnings))

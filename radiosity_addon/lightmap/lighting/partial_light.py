@@ -156,9 +156,5 @@ class LightSoFar:
 
     def _values_at(self, sources: Array) -> Array:
         """Return (g, k, 3) the radiosity of (g, k) hits as they are numbered before the table is made."""
-        table = self._table
-        assert table is not None
-        elements, flat = table.local.elements, sources.ravel()
-        values = values_of(elements.reflected(), table.elements_of(flat, self._element))
-        values[flat < 0] = elements.beyond()[flat[flat < 0]]
-        return np.asarray(values.reshape(*sources.shape, 3))
+        assert self._table is not None
+        return self._table.expected(sources, self._element)

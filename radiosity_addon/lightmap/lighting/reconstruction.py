@@ -120,7 +120,7 @@ def light_texels(
     error = light.error if previous is None else previous.traced.error
     light = replace(light, state=crossings.state, error=error)
     progress.at(1.0)
-    if gains is None or layout is None or local.direct.sources is None or light.table is None:
+    if gains is None or local.direct.sources is None or light.table is None:
         return light
     assert light.smoothing is not None  # chosen from the noise
     warm_start = WarmStart(local.direct.sources.strengths, light.table)
@@ -159,10 +159,10 @@ def _trace(
     standing: StandingHits | None,
     so_far: LightSoFar | None,
     progress: Progress,
-) -> tuple[TexelTransport, GatherPointLayout | None, TableRows]:
+) -> tuple[TexelTransport, GatherPointLayout, TableRows]:
     """Gather at texels and at the cells that their rays met, except what stands.
 
-    Returns also where points were chosen, if lights are kept apart, and the rows of the table of radiosity.
+    Returns also where points were chosen, and the rows of the table of radiosity.
     """
     met = None if so_far is None else partial(so_far.met, table)
     gathering, parts = progress.part(0.0, GATHER_FRACTION), progress.part(GATHER_FRACTION, 1.0)
@@ -170,10 +170,11 @@ def _trace(
     if standing is not None:
         kept = kept_points(standing, gathering.part(0.0, RETRACED))
         gathering = gathering.part(RETRACED, 1.0)
-    links, points = gather_texels(table.local, table.crossings, settings, table.number, kept, met, gathering)
-    layout = None if table.local.direct.sources is None else GatherPointLayout.of(points)
-    # How points are found takes more than what they met says.
-    del points, kept
+    values = partial(table.expected, below=element)
+    links, layout = gather_texels(
+        table.local, table.crossings, settings, table.number, values, kept, met, gathering
+    )
+    del kept
     if standing is not None:
         known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)

@@ -81,12 +81,10 @@ class Smoothing:
     passes: Array
 
     def __call__(self, geometry: TexelGeometry, values: Array, threads: int = 0) -> Array:
-        """Return (n, k) float32 values (n, k) float32 of the texels, smoothed."""
+        """Return (n, k) float32 values (n, k) of the texels, smoothed."""
         grid = _Grid(geometry, self.alike, threads)
-        current = values
-        result = geometry.scratch.empty(values.shape, np.float32)
-        for rows in tiles(len(values)):
-            result[rows] = values[rows]
+        current = columns([values], geometry.scratch)
+        result = columns([values], geometry.scratch)
         most, done = int(self.passes.max(initial=0)), 0
         for passes in PASSES:
             if passes > most:
@@ -101,22 +99,28 @@ class Smoothing:
 
 
 def choose_smoothing(
-    geometry: TexelGeometry, alike: Array, values: Array, noise: Array, threads: int = 0
-) -> Smoothing:
+    geometry: TexelGeometry, alike: Array, parts: Sequence[Array], noise: Array, threads: int = 0
+) -> tuple[Smoothing, Array]:
     """Choose how many steps each texel takes.
 
     Parameters
     ----------
     alike : (n,) uint8
         See `Smoothing`.
-    values : (n, 3) float
-        What the texels gathered [W/m²].
+    parts : sequence of (n, 3) float
+        What the texels gathered, in parts that take the same steps [W/m²].
     noise : (n, 3) float
-        A sample of its noise [W/m²].
+        A sample of the noise of their sum [W/m²].
+
+    Returns
+    -------
+    smoothing : Smoothing
+    smoothed : (n, 3 parts) float32
+        The parts after these steps [W/m²].
     """
     grid, scratch, count = _Grid(geometry, alike, threads), geometry.scratch, len(alike)
-    start = columns([values, noise], scratch)
-    current, done = start, 0
+    start = columns([*parts, noise], scratch)
+    current, smoothed, done = start, columns(parts, scratch), 0
     least, passes = scratch.empty(count, np.float32), np.zeros(count, dtype=np.uint8)
     for wanted in (0, *PASSES):
         for _ in range(wanted - done):
@@ -130,21 +134,29 @@ def choose_smoothing(
         for rows in tiles(count):
             better = (risk[rows, 0] < least[rows]) | (wanted == 0)
             passes[rows][better], least[rows][better] = wanted, risk[rows, 0][better]
-    return Smoothing(alike, passes)
+            smoothed[rows][better] = current[rows, :-3][better]
+    return Smoothing(alike, passes), smoothed
 
 
 def _risk(start: Array, current: Array) -> Array:
-    """Return (r,) estimates of the squared error of values and noise (r, 6), before and after some steps."""
-    square, left = (current - start) ** 2, current[:, 3:] ** 2
-    return np.asarray((BIAS * (square[:, :3] - square[:, 3:]) + left).sum(axis=1))
+    """Return (r,) estimates of the squared error of parts and noise (r, 3 k), before and after some steps."""
+    risk = np.zeros(len(start), dtype=np.float32)
+    for channel in range(3):
+        change = current[:, channel::3] - start[:, channel::3]
+        left = current[:, channel - 3]
+        risk += BIAS * (change[:, :-1].sum(axis=1) ** 2 - change[:, -1] ** 2) + left**2
+    return risk
 
 
 def columns(parts: Sequence[Array], scratch: Scratch) -> Array:
-    """Return (n, 3 k) float32: k arrays (n, 3) side by side."""
-    result = scratch.empty((len(parts[0]), 3 * len(parts)), np.float32)
+    """Return (n, k) float32: arrays (n, …) side by side, each column in one piece."""
+    width = sum(part.shape[1] for part in parts)
+    result = scratch.empty((width, len(parts[0])), np.float32).T
     for rows in tiles(len(result)):
-        for number, part in enumerate(parts):
-            result[rows, 3 * number : 3 * number + 3] = part[rows]
+        first = 0
+        for part in parts:
+            result[rows, first : first + part.shape[1]] = part[rows]
+            first += part.shape[1]
     return result
 
 
@@ -213,14 +225,14 @@ class _Grid:
                 texel = page[band][row, column]
                 self._place[texel] = start + (row + band.start + 1) * width + column + 1
 
-    def neighbor(self, rows: slice, step: Array) -> Array:
+    def neighbor(self, rows: slice | Array, step: Array) -> Array:
         """Return (r,) the texels one step away on the page, or −1."""
         below = step[0] * self._width[self._page[rows]]
         return np.asarray(self._number[self._place[rows] + below + step[1]])
 
     def weighed(self, weights: Array, values: Array) -> Array:
-        """Return (n, k) float32: sums over texels and their neighbors by (256, 9) weights."""
-        result = self._scratch.empty(values.shape, np.float32)
+        """Return (n, k) float32: sums over texels and their neighbors by (256, 9) weights, in `columns`."""
+        result = self._scratch.empty(values.shape[::-1], np.float32).T
         fill_chunks(partial(_sums, self, weights, values), result, len(values), CHUNK, self._threads)
         return result
 
@@ -238,11 +250,12 @@ def _mutual(grid: _Grid, alike: Array, rows: slice) -> Array:
 def _sums(grid: _Grid, weights: Array, values: Array, rows: slice) -> Array:
     """Return (r, k) float32 the sums of a run of texels."""
     assert grid.alike is not None
-    there = grid.alike[rows]
-    weight = weights[there]
-    result = weight[:, :1] * values[rows]
-    for bit, step in enumerate(_STEPS):
-        has = np.flatnonzero(there & (1 << bit))
-        other = grid.neighbor(rows, step)[has]
-        result[has] += weight[has, bit + 1, None] * values[other]
+    has = rows.start + np.flatnonzero(grid.alike[rows])
+    there = grid.alike[has]
+    # Where there is no neighbor its weight is 0, whatever is read.
+    terms = [(weights[:, 0].take(there), has)]
+    terms += [(weights[:, bit + 1].take(there), grid.neighbor(has, step)) for bit, step in enumerate(_STEPS)]
+    result = np.array(values[rows], order="F")
+    for channel, column in enumerate(values.T):
+        result[has - rows.start, channel] = sum(weight * column.take(texel) for weight, texel in terms)
     return result

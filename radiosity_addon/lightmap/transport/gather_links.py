@@ -18,7 +18,7 @@ AIMED_ROWS = 1 << 14
 
 @dataclass(frozen=True)
 class GatherLinks:
-    """What the gather points saw, and how they speak for the texels.
+    """What the gather points saw, run by run of their rays, and how these speak for the texels.
 
     Attributes
     ----------
@@ -30,12 +30,17 @@ class GatherLinks:
         What some of the points ask apart.
     tints : (g, rays, 3) float16 or None
         What the light of each ray is multiplied with on its way through glass; None where there is none.
+    run : (g,) int16 or None
+        Which of its point's runs of rays each row is, one after the other from 0; None if all have one.
     """
+
+    STORED = ("sources", "spread", "aimed", "tints")
 
     sources: Array
     spread: Interpolation
     aimed: AimedRays = field(default_factory=AimedRays.none)
     tints: Array | None = None
+    run: Array | None = None
 
     def irradiance(
         self,

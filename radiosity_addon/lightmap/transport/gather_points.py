@@ -13,19 +13,20 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, marked, row_numbers, tiles
+from ...numerics import Array, marked, row_numbers, run_numbers, tiles
 from ...solver.gather import AimedRays, Footprints, GatheredHits, LocalPass, Resolver
 from ..points import GatherPoints, Interpolation, fit, refit
 from ..texels import Crossings, TexelGeometry
 from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
+from .ray_runs import RUNS, Values, over_points, over_rows, runs_of, variance_of
 from .traced_texels import GatherPointLayout
 
 CHUNK = 1 << 16
 """Texels whose elements are looked up at once; bounds the temporaries to about 20 MB."""
 
-STARTS = 16
-"""Points of a texel's footprint that its gather rays start from."""
+STARTS = 8
+"""Points of a texel's footprint that a run of its gather rays starts from."""
 
 FIT = 0.15
 """The part of gathering that weighs the points."""
@@ -38,9 +39,9 @@ Met = Callable[[Array, GatheredHits, int], None]
 class KeptPoints:
     """The gather points that stay of an earlier bake.
 
-    before: All of its g points, and …
+    before: All of its g runs of rays, and …
     spread: … how they speak for its texels.
-    rows (k,) int: Those that stay.
+    rows (k,) int: Those that stay, the runs of a point all or none.
     gathered: What these meet now.
     unsure (n,) bool: Texels whose points are weighed again; further points are chosen among them.
     """
@@ -51,22 +52,75 @@ class KeptPoints:
     gathered: GatheredHits
     unsure: Array
 
-    def of_level(self, level: int) -> tuple[Array, GatheredHits]:
-        """Return the texels of a level's points, and what they meet."""
+    def of_level(self, level: int) -> tuple[Array, Array, GatheredHits]:
+        """Return texel and number of the runs of a level's points, and what they meet."""
         at_level, found = self.before.level[self.rows] == level, self.gathered
         tints = None if found.tints is None else found.tints[at_level]
         kept = GatheredHits(
             found.sources[at_level], found.closeness[at_level], found.aimed.of_points(at_level), tints
         )
-        return self.before.texel[self.rows[at_level]], kept
+        rows = self.rows[at_level]
+        return self.before.texel[rows], self.before.run[rows], kept
 
     def refitted(self, points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
         """Return how `points`, these and further ones, speak for the texels."""
         of_texel = np.full(len(geometry), -1, dtype=np.int32)
         of_texel[points.texel] = np.arange(len(points))
+        spread = over_points(self.spread, self.before)
         number = np.full(len(self.before.texel), -1, dtype=np.int32)
         number[self.rows] = of_texel[self.before.texel[self.rows]]
-        return refit(points, geometry, self.spread, number, self.unsure)
+        return refit(points, geometry, spread, number, self.unsure)
+
+
+class _Runs:
+    """What the runs of rays of all points meet, in the order of the points.
+
+    rays: Of a run.
+    """
+
+    def __init__(self, local: LocalPass, geometry: TexelGeometry, rays: int) -> None:
+        self.rays, self._scratch = rays, geometry.scratch
+        self._sources = self._scratch.rows(rays, np.int32)
+        self._tints = self._scratch.rows(3 * rays, np.float16) if local.caster.tinted else None
+        self._lists: list[tuple[Array, Array, Array]] = []
+        self._aimed: list[AimedRays] = []
+        self._first: list[int] = []
+
+    def more(self, count: int) -> tuple[Array, Array | None]:
+        """Return where sources (count, rays) and tints (count, rays, 3) of further runs are to be put."""
+        self._first.append(len(self._sources))
+        tints = None if self._tints is None else self._tints.more(count).reshape(count, self.rays, 3)
+        return self._sources.more(count), tints
+
+    def add(self, texel: Array, run: Array, gathered: GatheredHits) -> None:
+        """Add what the runs just asked for met: run numbers (r,) at texels (r,), the runs of each in turn."""
+        self._lists.append((texel, run, gathered.closeness))
+        self._aimed.append(gathered.aimed)
+
+    def points(self, first_list: int) -> tuple[Array, Array]:
+        """Return the texels of the points added since a list, and how close things are to them."""
+        texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists[first_list:], strict=True))
+        start = np.flatnonzero(run == 0)
+        if not len(start):
+            return texel, closeness
+        count = np.diff(np.append(start, len(run)))
+        return texel[start], np.add.reduceat(closeness, start) / count
+
+    def count(self) -> int:
+        """Return how many lists have been added."""
+        return len(self._lists)
+
+    def all(self, spread: Interpolation, points: GatherPoints) -> tuple[GatherLinks, GatherPointLayout]:
+        """Return the links of all runs, given how the points speak for the texels."""
+        texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists, strict=True))
+        count = np.diff(np.append(np.flatnonzero(run == 0), len(run)))
+        layout = GatherPointLayout(
+            texel, np.repeat(points.level, count), run.astype(np.int16), closeness, points.farthest
+        )
+        tints = None if self._tints is None else self._tints.all().reshape(len(run), self.rays, 3)
+        aimed = AimedRays.joined(self._aimed, self._first, self._scratch)
+        rows = over_rows(spread, count, self._scratch)
+        return GatherLinks(self._sources.all(), rows, aimed, tints, layout.run), layout
 
 
 def gather_texels(
@@ -74,54 +128,59 @@ def gather_texels(
     crossings: Crossings,
     settings: GatherSettings,
     resolve: Resolver,
+    values: Values | None = None,
     kept: KeptPoints | None = None,
     met: Met | None = None,
     progress: Progress = SILENT,
-) -> tuple[GatherLinks, GatherPoints]:
-    """Gather at few texels, densely where others do not reach; `kept` points do not gather again."""
+) -> tuple[GatherLinks, GatherPointLayout]:
+    """Gather at few texels, densely where others do not reach; `kept` points do not gather again.
+
+    values: What sources send, as far as that is known: more rays go where it varies. None sends as many
+        everywhere.
+    """
     geometry = crossings.geometry
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     if kept is not None:
         points.farthest = np.where(kept.unsure, np.inf, kept.before.farthest)
-    aimed: list[AimedRays] = []
-    first: list[int] = []
-    sources = geometry.scratch.rows(settings.rays, np.int32)
-    tints = geometry.scratch.rows(3 * settings.rays, np.float16) if local.caster.tinted else None
+    runs = _Runs(local, geometry, max(settings.rays // RUNS, 1))
+    variance = np.zeros(0)
     for level, (stride, of_level) in enumerate(progress.part(0.0, 1.0 - FIT).each(settings.strides)):
-        texels, closeness = [], []
+        lists, found = runs.count(), []
         if kept is not None:
-            texel, stays = kept.of_level(level)
-            first.append(len(sources))
-            sources.more(len(texel))[:] = stays.sources
+            texel, run, stays = kept.of_level(level)
+            sources, tints = runs.more(len(texel))
+            sources[:] = stays.sources
             if tints is not None and stays.tints is not None:
-                tints.more(len(texel))[:] = stays.tints.reshape(len(texel), -1)
-            texels.append(texel)
-            closeness.append(stays.closeness)
-            aimed.append(stays.aimed)
-        chosen = _choose(points, crossings, kept, stride, settings.support, of_level.part(0.0, 0.2))
+                tints[:] = stays.tints
+            runs.add(texel, run, stays)
+            found.append((run, stays.sources, stays.tints))
+        chosen = _choose(points, crossings, kept, stride, settings.support, of_level.part(0.0, 0.15))
+        many = runs_of(points, variance, chosen, of_level.part(0.15, 0.2))
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
         done = 0.2
-        for batch, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
-            before, done = done, done + 0.8 * len(batch) / max(len(chosen), 1)
+        for batch, starts in ((~edge, STARTS), (edge, None)):
+            texel, run = np.repeat(chosen[batch], many[batch]), run_numbers(many[batch])
+            before, done = done, done + 0.8 * len(texel) / max(int(many.sum()), 1)
             part = of_level.part(before, done)
-            first.append(len(sources))
-            colors = None if tints is None else tints.more(len(batch)).reshape(len(batch), settings.rays, 3)
-            into = sources.more(len(batch)), colors
-            gathered = gather_at(local, geometry, batch, starts, settings.rays, resolve, into, part)
+            into = runs.more(len(texel))
+            gathered = gather_at(local, geometry, texel, starts, runs.rays, resolve, into, part, run)
             if met is not None:
-                met(batch, gathered, stride)
-            texels.append(batch)
-            closeness.append(gathered.closeness)
-            aimed.append(gathered.aimed)
-        points.add(stride, np.concatenate(texels), np.concatenate(closeness))
+                met(texel, gathered, stride)
+            runs.add(texel, run, gathered)
+            found.append((run, *into))
+        if values is not None and level + 1 < len(settings.strides):
+            of_runs = np.concatenate([variance_of(sources, tints, values) for _, sources, tints in found])
+            start = np.flatnonzero(np.concatenate([run for run, _, _ in found]) == 0)
+            if len(start):
+                count = np.diff(np.append(start, len(of_runs)))
+                variance = np.append(variance, np.add.reduceat(of_runs, start) / count)
+        points.add(stride, *runs.points(lists))
     if kept is None:
         spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     else:
         spread = kept.refitted(points, geometry)
-    colors = None if tints is None else tints.all().reshape(len(points), settings.rays, 3)
-    rays_aimed = AimedRays.joined(aimed, first, geometry.scratch)
-    return GatherLinks(sources.all(), spread, rays_aimed, colors), points
+    return runs.all(spread, points)
 
 
 def gather_at(
@@ -133,9 +192,10 @@ def gather_at(
     resolve: Resolver,
     into: tuple[Array, Array | None] | None = None,
     progress: Progress = SILENT,
+    run: Array | None = None,
 ) -> GatheredHits:
-    """Gather at some texels. `into` takes the sources and tints, if given."""
-    at = gather_footprints(geometry, chosen, starts)
+    """Gather at some texels, by one `run` (c,) of their rays. `into` takes sources and tints, if given."""
+    at = gather_footprints(geometry, chosen, starts, run)
     expected, upright = (geometry.scratch.empty((len(chosen), *shape)) for shape in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):
         texels = chosen[tile]
@@ -144,13 +204,15 @@ def gather_at(
     return local.gather.at(at, upright, rays, resolve, expected, into, progress)
 
 
-def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
-    """Return where texels gather, each from `starts` points."""
+def gather_footprints(
+    geometry: TexelGeometry, chosen: Array, starts: int | None, run: Array | None = None
+) -> Footprints:
+    """Return where texels gather, each from `starts` points, by one run (c,) of their rays."""
     position, normal = (geometry.scratch.empty((len(chosen), 3)) for _ in range(2))
     for tile in tiles(len(chosen)):
         position[tile], normal[tile] = geometry.position[chosen[tile]], geometry.normal[chosen[tile]]
     sampler = partial(sample_of, geometry, chosen)
-    return Footprints(position, normal, chosen, sampler, starts=starts, scratch=geometry.scratch)
+    return Footprints(position, normal, chosen, sampler, starts=starts, runs=run, scratch=geometry.scratch)
 
 
 def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
-from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass
+from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass, values_of
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood
 
 WIDE_TEXEL = 4.0
@@ -118,6 +118,16 @@ class HitTable:
         element[own] = self.element_cells.leaf_of(self.element_cell(number[own]))
         element[cell] = below[self.texel_cells.texel_of(self.texel_cell(number[cell]))]
         return element
+
+    def expected(self, numbers: Array, below: Array) -> Array:
+        """Return (g, k, 3) what (g, k) hits reflect by the hierarchy's light, and the sky's light [W/m²].
+
+        below (n,): The leaf elements below the texels, or NOTHING.
+        """
+        elements, flat = self.local.elements, numbers.ravel()
+        values = values_of(elements.reflected(), self.elements_of(flat, below))
+        values[flat < 0] = elements.beyond()[flat[flat < 0]]
+        return np.asarray(values.reshape(*numbers.shape, 3))
 
     def reflectance(self, number: Array, of_element: bool, of_texels: Array) -> Array:
         """Return (p, 3) the reflectance of cells of elements, or of texels by that of theirs, (n, 3)."""

@@ -16,6 +16,7 @@ from ...solver.gather import LightGains
 from ..points import Smoothing, choose_smoothing, columns
 from ..texels import TexelGeometry
 from .gather_links import GatherLinks
+from .ray_runs import noise_weights
 from .source_means import CHUNK_HITS, SourceMeans, by_channel, mean_of_sources
 from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
@@ -217,20 +218,16 @@ def sweep(
             seen(direct + indirect)
         if largest <= tolerance * total / max(3 * texel_count, 1):
             break
-    smoothing = None if smooth is None else smooth.known
-    noise = None
-    if estimate:
-        noise = estimated_noise(links, table, threads, scratch)
-        if smooth is not None and smoothing is None:
-            gathered = _difference(direct, lamps, scratch)
-            for rows in tiles(texel_count):
-                gathered[rows] += indirect[rows]
-            smoothing = choose_smoothing(smooth.geometry, smooth.alike, gathered, noise, threads)
-    if smooth is not None and smoothing is not None:
-        parts = [indirect]
-        if beyond.any():
-            parts.append(_difference(direct, lamps, scratch))
-        shared = smoothing(smooth.geometry, columns(parts, scratch), threads)
+    noise = estimated_noise(links, table, threads, scratch) if estimate else None
+    smoothing, shared = None, None
+    if smooth is not None:
+        parts = [indirect, *([_difference(direct, lamps, scratch)] if beyond.any() else [])]
+        if smooth.known is not None:
+            smoothing, shared = smooth.known, smooth.known(smooth.geometry, columns(parts, scratch), threads)
+        elif noise is not None:
+            smoothing, shared = choose_smoothing(smooth.geometry, smooth.alike, parts, noise, threads)
+        del parts
+    if shared is not None:
         for rows in tiles(texel_count):
             indirect[rows] = np.maximum(shared[rows, :3], 0.0)
             if beyond.any():
@@ -279,8 +276,10 @@ def estimated_noise(
     half = links.sources.shape[1] // 2
     whole = mean_of_sources(table, links.sources, threads, scratch=scratch, tints=links.tints)
     part = mean_of_sources(table, links.sources, threads, half, scratch, links.tints)
+    run = np.zeros(len(part), dtype=np.int16) if links.run is None else links.run
+    weights, alone = noise_weights(run)
     for rows in tiles(len(part)):
-        part[rows] -= whole[rows]
+        part[rows] = np.where(alone[rows, None], part[rows] - whole[rows], weights[rows, None] * whole[rows])
     del whole
     return links.spread(part, scratch=scratch)
 

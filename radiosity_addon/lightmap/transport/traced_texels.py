@@ -5,31 +5,30 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...numerics import Array
-from ..points import GatherPoints
 from .gather_settings import GatherSettings
 from .hit_table import HitTable, TableRows
 
 
 @dataclass(frozen=True, eq=False)
 class GatherPointLayout:
-    """Where g gather points were chosen, level by level (see `GatherPoints`).
+    """Where gather points were chosen, level by level (see `GatherPoints`): of g runs of rays in turn.
 
     Attributes
     ----------
     texel, level : (g,) int32, int8
+        Of the point that takes the run.
+    run : (g,) int16
+        Which of the point's it is, from 0.
     closeness : (g,) float64 [1/m]
+        What the run itself saw.
     farthest : (n,) float64 [m]
     """
 
     texel: Array
     level: Array
+    run: Array
     closeness: Array
     farthest: Array
-
-    @staticmethod
-    def of(points: GatherPoints) -> GatherPointLayout:
-        """Keep what was chosen."""
-        return GatherPointLayout(points.texel, points.level, points.closeness, points.farthest)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ def _traced_again(
         chosen[rows[group]] = True
         of_group = None if tints is None else tints[group]
         before = GatheredHits(sources[group], closeness[group], links.aimed.of_points(chosen), of_group)
-        found = _gathered_again(standing, before, points.texel[rows[group]], starts, part)
+        found = _gathered_again(standing, before, rows[group], starts, part)
         sources[group], closeness[group] = found.sources, found.closeness
         if tints is not None:
             tints[group] = found.tints
@@ -62,9 +62,10 @@ def _traced_again(
 
 
 def _gathered_again(
-    standing: StandingHits, before: GatheredHits, texel: Array, starts: int | None, progress: Progress
+    standing: StandingHits, before: GatheredHits, rows: Array, starts: int | None, progress: Progress
 ) -> GatheredHits:
     previous, table = standing.previous, standing.table
+    texel, run = previous.traced.points.texel[rows], previous.traced.points.run[rows]
     geometry, local = table.geometry, table.local
     corners = previous.local.elements.hierarchy.corners[before.aimed.element]
     low, high = corners.min(axis=2), corners.max(axis=2)
@@ -80,7 +81,7 @@ def _gathered_again(
         hosts=hosts,
     )
     expected = local.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
-    at = gather_footprints(geometry, texel, starts)
+    at = gather_footprints(geometry, texel, starts, run.astype(np.int64))
     return local.gather.again_at(
         at, geometry.surface_normal[texel], table.number, earlier, expected, progress
     )

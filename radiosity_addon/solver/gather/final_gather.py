@@ -236,7 +236,7 @@ class FinalGather:
         """Return (r, rays, 3) float32: where the cosine-distributed rays of some rows go."""
         normals = self._at.normals[rows]
         seed = self._seed + Stream.GATHER_DIRECTIONS
-        local = cosine_hemisphere(stratified_square(self._at.keys[rows], self._rays, seed))
+        local = cosine_hemisphere(self._square(rows, self._rays, seed))
         frame = np.stack([*orthonormal_basis(normals), normals], axis=1).astype(np.float32)
         return np.asarray(local @ frame)
 
@@ -259,7 +259,7 @@ class FinalGather:
         """Trace the rays that some rows aim at bright elements."""
         count = max(self._rays // AIMED_PART, 1)
         start = self._starts(rows, count, self._seed + Stream.AIMED_STARTS)
-        unit = stratified_square(self._at.keys[rows], count, self._seed + Stream.AIMED_DIRECTIONS)
+        unit = self._square(rows, count, self._seed + Stream.AIMED_DIRECTIONS)
         aim = bright.aim(start, self._at.normals[rows], shares, unit)
         hits = self._caster.intersect(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
         arrived = self._leaves_of(hits) == aim.element.ravel()
@@ -272,6 +272,12 @@ class FinalGather:
             weights = weights[..., None] * hits.tint.reshape(*shape, 3)
         return AimedRays(aim.row, sources.reshape(shape), weights, aim.element)
 
+    def _square(self, rows: Array, count: int, seed: int) -> Array:
+        """Return (r, count, 2) float32: the points in the unit square that are the turn of some rows."""
+        runs = self._at.runs
+        first = 0 if runs is None else runs[rows] * count
+        return stratified_square(self._at.keys[rows], count, seed, first)
+
     def _starts(self, rows: Array, rays: int, seed: int) -> Array:
         """Return (r, rays, 3) where rays start, just above the footprints."""
         at = self._at
@@ -279,7 +285,7 @@ class FinalGather:
         if at.sampler is None:
             return np.repeat(at.points[rows][:, None] + lift, rays, axis=1)
         starts_used = min(at.starts or rays, rays)
-        starts = at.sampler(rows, stratified_square(at.keys[rows], starts_used, seed)) + lift
+        starts = at.sampler(rows, self._square(rows, starts_used, seed)) + lift
         return np.asarray(starts[:, np.arange(rays) * starts_used // rays])
 
     def _starts_of(self, rows: Array, ray: Array) -> Array:
@@ -291,7 +297,7 @@ class FinalGather:
         starts_used = min(at.starts or self._rays, self._rays)
         distinct, number = np.unique(rows, return_inverse=True)
         number, place = number.reshape(-1), ray * starts_used // self._rays
-        unit = stratified_square(at.keys[distinct], starts_used, self._seed + Stream.GATHER_STARTS)
+        unit = self._square(distinct, starts_used, self._seed + Stream.GATHER_STARTS)
         if len(rows) < starts_used * len(distinct):
             return np.asarray(at.sampler(rows, unit[number, place][:, None])[:, 0] + lift)
         return np.asarray(at.sampler(distinct, unit)[number, place] + lift)

@@ -60,6 +60,7 @@ class Footprints:
         itself; None gives every ray its own.
     expected (n,) or None [W/m²]: About how much light there is, a mean of the channels: a lamp that can add
         little to it gets few shadow rays. With None all lamps get the same number.
+    runs (n,) int or None: Which run of its key's rays each point takes: one goes on where the last ended.
     lift: Moves the starts of shadow rays off a smooth surface's flat triangles.
     scratch: Makes arrays of what is found at the points.
     """
@@ -71,6 +72,7 @@ class Footprints:
     near: Callable[[Array], Array] | None = None
     starts: int | None = None
     expected: Array | None = None
+    runs: Array | None = None
     lift: Lift | None = None
     scratch: Scratch = field(default_factory=Scratch)
 

@@ -1,0 +1,117 @@
+"""How many rays gather points take: more where coarser points around them see light that varies more.
+
+Rays come in runs of the same length; a point takes one or several, which go on in one sequence. Each run has
+a row of its own among the stored hits, and a point stands for the mean of its rows. The number of runs
+depends on what points of coarser levels met, never on what the point itself meets: so no mean is biased
+(a point that took further rays only after a lucky one would be darkened in the mean).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from ...base import SILENT, Progress
+from ...numerics import Array, Scratch, fill_chunks, run_numbers, run_starts, tiles
+from ..points import GatherPoints, Interpolation
+from .traced_texels import GatherPointLayout
+
+RUNS = 2
+"""Runs of rays of a point, in the mean."""
+
+MOST_RUNS = 16
+"""No point takes more."""
+
+EVEN = 0.25
+"""This part of the rays is for all points alike; the others are in proportion to the noise expected."""
+
+GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
+
+CHUNK = 1 << 13
+"""Points whose neighbors are looked up at once."""
+
+Values = Callable[[Array], Array]
+"""(g, k) int32 sources → (g, k, 3): their radiosity as far as it is known [W/m²]."""
+
+
+def variance_of(sources: Array, tints: Array | None, values: Values) -> Array:
+    """Return (g,) the variance of what the rays of rows brought, summed over the channels.
+
+    tints (g, rays, 3): What it is multiplied with on its way.
+    """
+    result = np.empty(len(sources))
+    for rows in tiles(len(sources), CHUNK):
+        brought = values(sources[rows])
+        if tints is not None:
+            brought = brought * tints[rows]
+        result[rows] = brought.var(axis=1).sum(axis=1)
+    return result
+
+
+def runs_of(points: GatherPoints, variance: Array, chosen: Array, progress: Progress = SILENT) -> Array:
+    """Return (c,) int: how many runs each chosen texel takes.
+
+    points: Those of coarser levels, …
+    variance (g,): … and of each, that of what its rays brought. Without any all take as many.
+    """
+    if not len(chosen) or not variance.any():
+        return np.full(len(chosen), RUNS)
+    noise = np.empty(len(chosen))
+    expected = partial(_expected_noise, points, variance, chosen)
+    fill_chunks(expected, noise, len(chosen), CHUNK, points.threads, progress)
+    share = EVEN + (1.0 - EVEN) * noise / max(float(noise.mean()), 1e-300)
+    # Fractions are rounded up as often as they are large, so that the mean stays.
+    runs = np.floor(RUNS * share + np.modf(GOLDEN_RATIO * chosen)[0])
+    return np.clip(runs, 1, MOST_RUNS).astype(np.int64)
+
+
+def _expected_noise(points: GatherPoints, variance: Array, chosen: Array, rows: slice) -> Array:
+    """Return (r,) the noise of a ray at some of the chosen texels: that of the points around them."""
+    row, point = points.pairs(chosen[rows])
+    count = np.bincount(row, minlength=rows.stop - rows.start)
+    total = np.bincount(row, variance[point], minlength=len(count))
+    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), variance.mean()))
+
+
+def noise_weights(run: Array) -> tuple[Array, Array]:
+    """Return how means of rows make a sample of their points' noise.
+
+    The mean of half of a point's runs differs from that of all by about as much as that of all is off.
+
+    run (g,) int: Which of its point's runs each row is, one after the other from 0.
+    Returns weights (g,): Of the rows' means: their mean over a point is the sample. And alone (g,) bool: rows
+        of points with a single run, of which half the rays have to do.
+    """
+    start = np.flatnonzero(run == 0)
+    count = np.repeat(np.diff(np.append(start, len(run))), np.diff(np.append(start, len(run))))
+    half = np.maximum(count // 2, 1)
+    weights = np.where(run < half, count / half, 0.0) - 1.0
+    return weights * np.sqrt(half / np.maximum(count - half, 1)), count == 1
+
+
+def over_rows(spread: Interpolation, runs: Array, scratch: Scratch) -> Interpolation:
+    """Return how rows speak for texels, given how points do, and (g,) how many rows in turn each has."""
+    first_row = run_starts(runs)
+    first = scratch.empty(len(spread.first), np.int64)
+    row, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
+    total = 0
+    for texels in tiles(len(spread.first)):
+        entries = spread.entries_of(texels)
+        count = runs[spread.point[entries]]
+        start = np.append(0, np.cumsum(count))
+        first[texels] = total + start[spread.first[texels] - entries.start]
+        total += int(start[-1])
+        row.extend(run_numbers(count, first_row[spread.point[entries]]).astype(np.int32))
+        weight.extend(np.repeat(spread.weight[entries] / count.astype(np.float32), count))
+    return Interpolation(first, row.all()[:, 0], weight.all()[:, 0])
+
+
+def over_points(spread: Interpolation, layout: GatherPointLayout) -> Interpolation:
+    """Return what `over_rows` was given, with the first row of each point in its place."""
+    runs = np.bincount(layout.texel)[layout.texel]
+    is_first = layout.run[spread.point] == 0
+    point = spread.point[is_first]
+    first = np.append(0, np.cumsum(is_first))[spread.first]
+    return Interpolation(first, point, spread.weight[is_first] * runs[point].astype(np.float32))
