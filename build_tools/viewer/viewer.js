@@ -1,27 +1,31 @@
 /* The program of viewer.html: the scene with its lightmaps, and a panel. Bundled by `build.py viewer`. */
 
 import {
-  Box3, Color, NeutralToneMapping, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+  ACESFilmicToneMapping, AgXToneMapping, Box3, Color, CubeCamera, DataTexture, EquirectangularReflectionMapping,
+  FloatType, HalfFloatType, LinearFilter, LinearSRGBColorSpace, LinearToneMapping, NeutralToneMapping,
+  PerspectiveCamera, PMREMGenerator, Raycaster, RGBAFormat, Scene, Vector2, Vector3, WebGLCubeRenderTarget, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { loadLit } from '../../radiosity_addon/exports/assets/three-lightmap.js';
+import { colorsOf, loadLit, readKtx2 } from '../../radiosity_addon/exports/assets/three-lightmap.js';
 
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
+/* Blender's view transforms by the begin of their names; all others are as Standard. Filmic is nearest to AgX. */
+const VIEWS = { AgX: AgXToneMapping, Filmic: AgXToneMapping, 'Khronos PBR Neutral': NeutralToneMapping, ACES: ACESFilmicToneMapping };
+const CHOICES = { AgX: AgXToneMapping, Standard: LinearToneMapping, Neutral: NeutralToneMapping, ACES: ACESFilmicToneMapping };
 const byId = (id) => document.getElementById(id);
 
 function embedded(name) {
-  const text = document.querySelector(`script[data-file="${CSS.escape(name)}"]`).textContent;
-  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+  const text = document.querySelector(`script[data-file="${CSS.escape(name)}"]`)?.textContent;
+  return text && Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 }
 
 async function start() {
   const read = async (name) => embedded(name);
   const [shiny, matte] = [await loadLit('scene.glb', { read }), await loadLit('scene.glb', { read, matte: true })];
   const renderer = new WebGLRenderer({ antialias: true });
-  renderer.toneMapping = NeutralToneMapping;
   document.body.append(renderer.domElement);
   const scene = new Scene();
-  scene.background = new Color(0x202224);
+  scene.background = await background() ?? new Color(0x202224);
   const camera = cameraOf(shiny);
   const target = targetOf(shiny, camera); // before the controls turn the camera
   const controls = new OrbitControls(camera, renderer.domElement);
@@ -30,9 +34,13 @@ async function start() {
 
   let lit = shiny;
   scene.add(lit.scene);
-  const automatic = exposureFor(shiny);
+  const { view } = shiny.index;
+  const own = Object.entries(VIEWS).find(([name]) => view.transform.startsWith(name))?.[1] ?? LinearToneMapping;
+  for (const [name, mapping] of Object.entries(CHOICES)) byId('view').add(new Option(name, mapping, mapping === own, mapping === own));
+  byId('exposure').value = view.exposure;
   const draw = () => {
-    renderer.toneMappingExposure = automatic * 2 ** byId('exposure').valueAsNumber;
+    renderer.toneMapping = Number(byId('view').value);
+    renderer.toneMappingExposure = 2 ** byId('exposure').valueAsNumber;
     byId('stops').value = byId('exposure').valueAsNumber.toFixed(1);
     renderer.render(scene, camera);
   };
@@ -49,6 +57,11 @@ async function start() {
     draw();
   };
   byId('exposure').addEventListener('input', draw);
+  byId('view').addEventListener('change', draw);
+  byId('auto').addEventListener('click', () => {
+    byId('exposure').value = Math.log2(exposureFor(shiny));
+    draw();
+  });
   byId('only').addEventListener('change', showOnly);
   byId('matte').addEventListener('change', () => {
     scene.remove(lit.scene);
@@ -58,7 +71,9 @@ async function start() {
   });
   controls.addEventListener('change', draw);
   addEventListener('resize', resize);
-  addSliders([shiny, matte], draw);
+  const reflect = () => reflectIn(renderer, scene, shiny, camera, target);
+  addSliders([shiny, matte], () => { reflect(); draw(); });
+  reflect();
   const raycaster = new Raycaster();
   renderer.domElement.addEventListener('pointermove', (event) => {
     const place = new Vector2(2 * event.clientX / innerWidth - 1, 1 - 2 * event.clientY / innerHeight);
@@ -69,6 +84,21 @@ async function start() {
   byId('panel').hidden = false;
   resize();
   Object.assign(window, { viewer: { renderer, scene, camera, controls, shiny, matte, draw, raycaster } });
+}
+
+/** What is behind all objects, around: rows of the file from the top, of textures from the bottom. */
+async function background() {
+  const file = embedded('background.ktx2');
+  if (!file) return null;
+  const seen = await readKtx2(file), colors = colorsOf(seen), row = 4 * seen.width;
+  const flipped = new Float32Array(colors.length);
+  for (let y = 0; y < seen.height; y++) flipped.set(colors.subarray(y * row, (y + 1) * row), (seen.height - 1 - y) * row);
+  const texture = new DataTexture(flipped, seen.width, seen.height, RGBAFormat, FloatType);
+  texture.mapping = EquirectangularReflectionMapping;
+  texture.colorSpace = LinearSRGBColorSpace; // so that it is tone-mapped
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.needsUpdate = true;
+  return texture;
 }
 
 function cameraOf(lit) {
@@ -133,14 +163,35 @@ function illuminanceAt(lit, hit) {
 
 function lightmapOnly(material, only) {
   material.userData.kept ??= { color: material.color.clone(), map: material.map, metalness: material.metalness,
-    emissiveIntensity: material.emissiveIntensity, aoMap: material.aoMap };
+    emissiveIntensity: material.emissiveIntensity, aoMap: material.aoMap, mirrors: material.envMap };
   const kept = material.userData.kept;
   material.color.copy(only ? new Color(1, 1, 1) : kept.color);
   material.emissiveIntensity = only ? 0 : kept.emissiveIntensity;
   // Cut-outs are in the image of the color.
   material.map = only && !material.alphaTest && !material.transparent ? null : kept.map;
   if (kept.metalness !== undefined) material.metalness = only ? 0 : kept.metalness;
+  if (kept.mirrors) material.envMap = only ? null : kept.mirrors;
   material.needsUpdate = true;
+}
+
+/** Metal mirrors what is around the place that is looked at: a lightmap holds no surroundings. It has no diffuse
+ *  color, to which three.js would add their light once more. */
+function reflectIn(renderer, scene, lit, camera, place) {
+  const metals = [...lit.materials.values()].filter((each) => each.metalness > 0.99 && !each.metalnessMap);
+  if (!metals.length) return;
+  const seen = new WebGLCubeRenderTarget(256, { type: HalfFloatType });
+  const around = new CubeCamera(camera.near, camera.far, seen);
+  around.position.copy(place);
+  for (const material of metals) material.visible = false; // the place may be within one
+  around.update(renderer, scene);
+  const filtered = new PMREMGenerator(renderer).fromCubemap(seen.texture).texture;
+  for (const material of metals) {
+    material.envMap?.dispose();
+    Object.assign(material, { envMap: filtered, visible: true });
+    if (material.userData.kept) material.userData.kept.mirrors = filtered;
+    material.needsUpdate = true;
+  }
+  seen.dispose();
 }
 
 function addSliders(scenes, draw) {

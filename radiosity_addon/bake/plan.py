@@ -20,7 +20,15 @@ from ..options import BakeSettings
 from ..scene import BakeScene
 from .importance import scales_of
 from .relight import KeptBake
-from .scene_diff import Part, compare, light_digest, rounded_digest, scene_record
+from .scene_diff import (
+    LightSummary,
+    Part,
+    changed_lights,
+    compare,
+    light_digest,
+    rounded_digest,
+    scene_record,
+)
 
 SHORT = 16
 """Characters of the digests that distinguish objects that are gone from renamed ones."""
@@ -66,15 +74,56 @@ class ShownBake(NamedTuple):
         before = set(self.objects.values())
         return [name for name, digest in digests.objects.items() if before and digest[:SHORT] not in before]
 
-    def described(self, digests: BakeDigests) -> str:
-        """Return in words which objects of the last bake have changed or are gone; "" for none."""
-        changed = {name for name in self.altered(digests) if name in self.objects}
+    def edits(self, digests: BakeDigests) -> SceneEdits:
+        """Return which objects are not as in the last bake."""
+        altered = set(self.altered(digests))
+        changed = altered & self.objects.keys()
         changed |= {
             name
             for name, lightmap in self.lightmaps.items()
             if name in digests.objects and lightmap.digest != digests.objects[name]
         }
-        return _described(self.gone(digests), [name for name in digests.objects if name in changed])
+        return SceneEdits(
+            tuple(self.gone(digests)),
+            tuple(name for name in digests.objects if name in changed),
+            tuple(name for name in digests.objects if name in altered - changed),
+        )
+
+
+class SceneEdits(NamedTuple):
+    """The names of objects and lights that are not as in the last bake."""
+
+    removed: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
+
+    def with_lights(
+        self, before: Mapping[str, LightSummary], now: Mapping[str, LightSummary], *, strengths: bool
+    ) -> SceneEdits:
+        """Return them with the lights that are not as before, except for renamed ones, once each.
+
+        strengths: Whether color and strength of lights count; a light of strength 0 is none.
+        """
+        gone = {name: light for name, light in before.items() if name not in now}
+        new = {name: light for name, light in now.items() if name not in before}
+        lights = (
+            [name for name, light in gone.items() if strengths and light not in new.values()],
+            changed_lights(before, now, strengths=strengths),
+            [name for name, light in new.items() if strengths and light not in gone.values()],
+        )
+        known = set().union(*self)
+        names = ([name for name in of if name not in known] for of in lights)
+        return SceneEdits(*((*one, *other) for one, other in zip(self, names, strict=True)))
+
+    @property
+    def described(self) -> str:
+        """Say what they are; "" for none."""
+        parts = []
+        for what, names in zip(("removed", "changed", "added"), self, strict=True):
+            named = ", ".join(f"'{name}'" for name in names[:_NAMED])
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            parts += [f"{what} since the last bake: {named}{more}"] if names else []
+        return "; ".join(parts)
 
 
 class BakeDigests(NamedTuple):
@@ -144,7 +193,7 @@ class BakePlan:
     @property
     def _ignored(self) -> str:
         """What else differs from the last bake, "" for nothing."""
-        described = _described(self.gone, self.altered)
+        described = SceneEdits(tuple(self.gone), tuple(self.altered)).described
         return f"{described}; their light and shadow stay until you bake all" if described else ""
 
 
@@ -220,12 +269,3 @@ def _opened(kept: KeptBake, bake_scene: BakeScene) -> list[str]:
     left_out = kept.solved.local.elements.hierarchy.faces.left_out
     opened = left_out & ~bake_scene.scene.sealed
     return [item.name for item in bake_scene.objects if opened[item.rows].any()]
-
-
-def _described(gone: Sequence[str], altered: Sequence[str]) -> str:
-    parts = []
-    for what, names in (("removed", gone), ("changed", altered)):
-        named = ", ".join(f"'{name}'" for name in names[:_NAMED])
-        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-        parts += [f"{what} since the last bake: {named}{more}"] if names else []
-    return "; ".join(parts)

@@ -1,4 +1,4 @@
-"""A warning of a bake: which object it is about, and what was used instead."""
+"""A warning or note of a bake: which object it is about, and what was used instead."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class BakeWarning:
-    """Something that was not understood: whose it is, and what was used instead."""
+    """Something that was not understood: whose it is, and what was used instead.
+
+    is_note: Nothing is wrong: it says what the bake took something for.
+    """
 
     name: str
     message: str
+    is_note: bool = False

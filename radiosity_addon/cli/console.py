@@ -155,7 +155,8 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
         alike = f", {len(shown)} of them shown" if len(shown) < len(warnings) else ""
         lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}{alike}:")
         lines += [f"  {warning['name']}: {warning['message']}" for warning in shown]
-    return lines
+    notes = [f"note: {note['message']}" for note in one_of_each(report.get("notes", ()))]
+    return [*lines, *notes]
 
 
 def _of_glass(objects: Sequence[str], power: dict[str, float] | None) -> str:

@@ -5,10 +5,19 @@ Arrays and bytes only; `blender/exporting` makes the scene that is written.
 
 from __future__ import annotations
 
+from .baked_light import emission_images
 from .engine_files import static_files
 from .glb import Glb, GlbError
 from .half_exr import read_half_exr, write_half_exr
-from .index_file import INDEX_NAME, GroupEntry, LightmapIndex, NodeEntry, PageEntry, lightmap_index
+from .index_file import (
+    INDEX_NAME,
+    GroupEntry,
+    LightmapIndex,
+    NodeEntry,
+    PageEntry,
+    ViewSettings,
+    lightmap_index,
+)
 from .ktx2 import read_ktx2, write_ktx2
 from .lit_gltf import LIGHTMAP_CHANNEL, ExportedNames, emissive_only, with_lightmaps
 from .pages import resampled
@@ -29,8 +38,10 @@ __all__ = [
     "LightmapPlace",
     "NodeEntry",
     "PageEntry",
+    "ViewSettings",
     "decode_rgb9e5",
     "decode_rgbm",
+    "emission_images",
     "emissive_only",
     "encode_rgb9e5",
     "encode_rgbm",

@@ -51,6 +51,20 @@ class GroupEntry:
 
 
 @dataclass(frozen=True)
+class ViewSettings:
+    """How the scene's renders are shown.
+
+    transform, look: Blender's names, such as `AgX` and `None`.
+    exposure: Stops.
+    """
+
+    transform: str = "Standard"
+    look: str = "None"
+    exposure: float = 0.0
+    gamma: float = 1.0
+
+
+@dataclass(frozen=True)
 class LightmapIndex:
     """What lightmaps.json says.
 
@@ -65,6 +79,7 @@ class LightmapIndex:
     baked_lights: Sequence[str] = ()
     lumens_per_watt: float = 683.0
     notes: Sequence[str] = field(default_factory=tuple)
+    view: ViewSettings = ViewSettings()
 
 
 def lightmap_index(index: LightmapIndex) -> str:

@@ -6,8 +6,9 @@ next to the .glb, as the standard allows no HDR image in it. The material's `ext
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,8 +39,7 @@ class ExportedNames:
     scene: The name of the scene.
     nodes, meshes mapping of str to str: Their names in the user's file.
     materials mapping of str to (str, int or None): The same, and the page of their lightmap.
-    glowing: Those materials, by their names in the written file, that emit light.
-    in_lightmap_uvs: Those with images in the lightmap's UVs.
+    in_lightmap_uvs: Those materials, by their names in the written file, with images in the lightmap's UVs.
     light_groups mapping of str to str: The light group of those whose emission is in one.
     """
 
@@ -47,7 +47,6 @@ class ExportedNames:
     nodes: Mapping[str, str] = field(default_factory=dict)
     meshes: Mapping[str, str] = field(default_factory=dict)
     materials: Mapping[str, tuple[str, int | None]] = field(default_factory=dict)
-    glowing: Collection[str] = ()
     in_lightmap_uvs: Collection[str] = ()
     light_groups: Mapping[str, str] = field(default_factory=dict)
 
@@ -100,30 +99,37 @@ def _name_lightmap(material: Json, page: int, texture: int, file: str) -> None:
 
 
 def emissive_only(
-    written: Glb, names: ExportedNames, pages: Mapping[tuple[int, bool], tuple[bytes, float]]
+    written: Glb,
+    names: ExportedNames,
+    images: Sequence[tuple[bytes, float]],
+    read_by: Mapping[tuple[int, int], int],
 ) -> Glb:
     """Return a written file in which baked materials emit what leaves them, and reflect nothing.
 
-    pages: For each page, and whether it is of glowing materials, an image in sRGB and the radiance of white.
+    images: In sRGB, each with the radiance of white.
+    read_by: Which of them a primitive reads that emits, by the numbers of its mesh and in that.
     """
     glb = written.copy()
     strip(glb.json)
     _remove_lamps(glb.json)
     _rename(glb.json, names)
-    textures: dict[tuple[int, bool], int] = {}
+    textures = []
+    for number, (png, _) in enumerate(images):
+        image, sampler = glb.add_image(png, f"Light {number}"), glb.add("samplers", dict(_CLAMPED))
+        textures.append(glb.add("textures", {"source": image, "sampler": sampler}))
+    made: dict[tuple[int, int], int] = {}
+    for (mesh, place), number in read_by.items():
+        primitive = glb.json["meshes"][mesh]["primitives"][place]
+        key = primitive["material"], number
+        if key not in made:
+            material = json.loads(json.dumps(glb.json["materials"][key[0]]))
+            _emit(material, textures[number], images[number][1])
+            made[key] = glb.add("materials", material)
+            glb.uses(EMISSIVE_STRENGTH)
+            glb.uses(SPECULAR)
+        primitive["material"] = made[key]
     for material in glb.json.get("materials", ()):
-        written_name = material["name"]
-        material["name"], page = names.materials.get(written_name, (written_name, None))
-        if page is None:
-            continue
-        of = page, written_name in names.glowing
-        if of not in textures:
-            image = glb.add_image(pages[of][0], f"Light {page}{' of emitters' if of[1] else ''}")
-            sampler = glb.add("samplers", dict(_CLAMPED))
-            textures[of] = glb.add("textures", {"source": image, "sampler": sampler})
-        _emit(material, textures[of], pages[of][1])
-        glb.uses(EMISSIVE_STRENGTH)
-        glb.uses(SPECULAR)
+        material["name"], _ = names.materials.get(material["name"], (material["name"], None))
     glb.merge_equal()
     return glb
 

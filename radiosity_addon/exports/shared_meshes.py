@@ -15,11 +15,11 @@ import numpy as np
 
 from ..numerics import Array
 from ..options import TEXEL_STEPS
+from .accessors import FLOAT32, floats_of
 from .glb import Glb, Json
 from .lit_gltf import LIGHTMAP, LIGHTMAP_CHANNEL, ExportedNames, strip
 
 COORDINATES = f"TEXCOORD_{LIGHTMAP_CHANNEL}"
-FLOAT32 = 5126
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def _found(
         material = glb.json["materials"][primitive["material"]]["name"] if "material" in primitive else ""
         if material in names.in_lightmap_uvs or primitive.get("targets"):
             return None
-        uv = _read(glb, primitive["attributes"].get(COORDINATES))
+        uv = floats_of(glb, primitive["attributes"].get(COORDINATES), 2)
         if uv is None:
             return None
         uv[:, 1] = 1.0 - uv[:, 1]
@@ -95,19 +95,6 @@ def _found(
     return _Found(
         node, name, page, [part - TEXEL_STEPS * low for part in parts], low, np.maximum(high - low, 1)
     )
-
-
-def _read(glb: Glb, number: int | None) -> Array | None:
-    """Return an accessor's pairs of floats (n, 2) float64; None if it is stored otherwise."""
-    if number is None:
-        return None
-    accessor = glb.json["accessors"][number]
-    if accessor["componentType"] != FLOAT32 or accessor["type"] != "VEC2" or "sparse" in accessor:
-        return None
-    view = accessor.get("bufferView")
-    if view is None or accessor.get("byteOffset") or glb.json["bufferViews"][view].get("byteStride"):
-        return None
-    return np.frombuffer(glb.views[view], "<f4", 2 * accessor["count"]).reshape(-1, 2).astype(np.float64)
 
 
 def _key(glb: Glb, found: _Found, digests: list[str]) -> str:

@@ -258,3 +258,60 @@ def test_the_exported_page_is_the_baked_one(baked: Path) -> None:
         np.testing.assert_allclose(made.shown.page(0)[..., :], TEXEL * np.ones((4, 8, 3)), rtol=1e-6)
     finally:
         made.close()
+
+
+@pytest.mark.parametrize(("most", "file"), [(100, "scene.glb"), (20_000, "viewer.html")])
+def test_a_disk_without_room_is_named_and_nothing_is_written(baked: Path, most: int, file: str) -> None:
+    """As a limit of the size of files, which is one of the process; the earlier export stays."""
+    resource = pytest.importorskip("resource")  # not on Windows
+    bpy.context.scene.radiosity.export_web = True
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for _ in range(2):
+        before = {path: path.read_bytes() for path in baked.rglob("*") if path.is_file()}
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, limits[1]))
+        try:
+            with pytest.raises(RuntimeError, match=rf"cannot write '.*_export/{file}': File too large"):
+                bpy.ops.radiosity.export()
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert {path: path.read_bytes() for path in baked.rglob("*") if path.is_file()} == before
+        assert bpy.ops.radiosity.export() == {"FINISHED"}
+
+
+def test_a_file_that_was_moved_exports_where_it_is(baked: Path) -> None:
+    """With its folder it replaces its export there; without its lightmaps it says what is missing."""
+    bpy.ops.file.make_paths_relative()
+    bpy.ops.wm.save_mainfile()
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    there = baked.rename(baked.parent / "moved")
+    bpy.ops.wm.open_mainfile(filepath=str(there / "room.blend"))
+    before = {path.name for path in export_folder(bpy.context).iterdir()}
+    (export_folder(bpy.context) / "scene.glb").unlink()
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    assert {path.name for path in export_folder(bpy.context).iterdir()} == before
+    assert export_folder(bpy.context).parent == there / "lightmaps"
+    assert not baked.exists()
+    alone = baked.parent / "alone"
+    alone.mkdir()
+    (there / "room.blend").rename(alone / "room.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(alone / "room.blend"))
+    with pytest.raises(
+        RuntimeError, match=r"lightmap '.*' is missing or damaged: put it back, or bake again"
+    ):
+        bpy.ops.radiosity.export()
+    assert [path.name for path in alone.rglob("*")] == ["room.blend"]
+
+
+def test_scenes_whose_names_differ_in_case_alone_do_not_replace_each_other(baked: Path) -> None:
+    """Where upper and lower case do not count, both exports go into one folder."""
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    earlier = export_folder(bpy.context)
+    other = bpy.context.scene.copy()
+    other.name = "scene"
+    bpy.context.window.scene = other
+    assert export_folder(bpy.context).name == "room_scene_export"
+    earlier.rename(export_folder(bpy.context))  # what such a file system shows
+    before = {path: path.read_bytes() for path in baked.rglob("*") if path.is_file()}
+    with pytest.raises(RuntimeError, match="is of scene 'Scene' of"):
+        bpy.ops.radiosity.export()
+    assert {path: path.read_bytes() for path in baked.rglob("*") if path.is_file()} == before

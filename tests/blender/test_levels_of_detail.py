@@ -13,6 +13,7 @@ from mathutils import Vector
 from radiosity_addon.blender.datablocks.image_values import pixels_of
 from radiosity_addon.blender.operators.export_operators import export_folder
 from radiosity_addon.blender.scene_export.levels_of_detail import level_in
+from radiosity_addon.blender.session import last_bake
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
@@ -123,8 +124,12 @@ def test_a_coarser_plane_shows_exactly_the_light_of_the_finest(room: Path) -> No
     entries = {entry["object"]: entry for entry in report["objects"]}
     assert entries["Shelf_LOD1"]["image"] == entries["Shelf_LOD0"]["image"]
     assert entries["Shelf_LOD1"]["share_of_page"] == 0.0
-    (said,) = [each["message"] for each in report["warnings"] if "levels of detail" in each["message"]]
+    (said,) = [each["message"] for each in report["notes"] if "levels of detail" in each["message"]]
     assert "'Shelf_LOD1', 'Shelf_LOD2' show the lightmap of 'Shelf_LOD0'" in said
+    assert not [each for each in report["warnings"] if "levels of detail" in each["message"]]
+    last = last_bake.read(bpy.context.scene)
+    assert said in last.notes
+    assert said not in [message for _, message in last.warnings]
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
     assert differences_since(before, dump_file()) == []
 
@@ -231,3 +236,20 @@ def test_levels_are_exported_with_the_lightmap_of_the_finest(room: Path) -> None
     assert bpy.ops.radiosity.export() == {"FINISHED"}
     index = json.loads((export_folder(bpy.context) / "lightmaps.json").read_text(encoding="utf-8"))
     assert {entry["node"] for entry in index["nodes"]} == {"Floor", "Shelf_LOD0", "Shelf_LOD1"}
+
+
+def test_a_level_that_renders_hide_is_named_by_exports(room: Path) -> None:
+    add_plane("Shelf_LOD0", 8)
+    hidden, away, other = (add_plane(name, 1) for name in ("Shelf_LOD1", "Shelf_LOD2", "Table_LOD1"))
+    hidden.hide_render = other.hide_render = True
+    collection = bpy.data.collections.new("Far")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(away)
+    bpy.context.scene.collection.objects.unlink(away)
+    collection.hide_render = True
+    assert bake() == {"FINISHED"}
+    assert bpy.ops.radiosity.export() == {"FINISHED"}
+    (index,) = room.glob("lightmaps/*_export/lightmaps.json")
+    notes = json.loads(index.read_text(encoding="utf-8"))["notes"]
+    named = "'Shelf_LOD1', 'Shelf_LOD2'"
+    assert f"levels of detail that are hidden from renders are not exported: {named}" in notes

@@ -11,7 +11,6 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender.command_line.main import main
-from radiosity_addon.exports import Glb, srgb_of_linear
 from tests.browser.browser import bundled, chromium, drawn
 from tests.browser.reference import inner_pixels, rendered
 from tests.browser.test_exports_in_browsers import Exported, check_validity, errors, is_even
@@ -65,34 +64,16 @@ def test_engines_show_what_cycles_shows(
 
 @pytest.mark.parametrize("engine", ["three", "babylon"])
 def test_light_without_lightmaps_is_within_eight_bits(staircase: Exported, engine: str) -> None:
-    """Where the base color is even: scene_baked.glb has no details that are finer than a lightmap texel."""
+    """Where the base color is even: scene_baked.glb has no details that are finer than a lightmap texel.
+
+    What is brightest there is sixty times as bright as the mean: one white for all surfaces gave 1.04 %.
+    """
     light = staircase.cycles_lightmap[..., :3].sum(axis=-1)
     base = staircase.cycles[..., :3].sum(axis=-1) / np.maximum(light, 1e-12)
     even = staircase.inner & is_even(base, 0.01)
     pixels = drawn(staircase.folder, staircase.programs[engine], *SIZE, FINER, form="baked")
     found = errors(pixels, staircase.cycles, even, 0.02)
-    assert found[0] < rounding(staircase.cycles[even & (light > 0), :3], white_of(staircase.folder))
-
-
-def white_of(folder: Path) -> float:
-    """Return the largest radiance of a color of 1 in scene_baked.glb."""
-    glb = Glb.of_bytes((folder / "scene_baked.glb").read_bytes())
-    extension = "KHR_materials_emissive_strength"
-    lit = [each["extensions"] for each in glb.json["materials"] if extension in each.get("extensions", {})]
-    return max(each[extension]["emissiveStrength"] for each in lit)
-
-
-def rounding(colors: np.ndarray, white: float) -> float:
-    """Return the relative RMS error of colors that are rounded to 8 bits of sRGB."""
-    code = 255.0 * srgb_of_linear(np.clip(colors / white, 0.0, 1.0))
-    slope = np.gradient(white * linear_of_srgb(np.arange(256) / 255.0))
-    step = np.interp(code, np.arange(256), slope)
-    return float(np.sqrt((step**2).sum() / 12 / (colors**2).sum()))
-
-
-def linear_of_srgb(values: np.ndarray) -> np.ndarray:
-    """Decode values in [0, 1] (IEC 61966-2-1)."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    assert found[0] < 0.01
 
 
 def test_the_validator_finds_no_error(staircase: Exported) -> None:

@@ -156,7 +156,7 @@ def test_lamps_go_or_stay() -> None:
 
 
 def test_a_baked_file_emits_and_reflects_nothing() -> None:
-    glb = read_back(emissive_only(written(), NAMES, {(0, True): (PNG, 7.5)}))
+    glb = read_back(emissive_only(written(), NAMES, [(PNG, 7.5)], {(0, 0): 0, (1, 0): 0}))
     (material,) = glb.json["materials"]
     assert material["emissiveFactor"] == [1.0, 1.0, 1.0]
     assert material["emissiveTexture"]["texCoord"] == 1

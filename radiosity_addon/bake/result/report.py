@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...base import BakeError
+from ...base import BakeError, BakeWarning
 from ...files import LISTED, OWNER, sealed, text_of
 from ...publishing import write_text
 from ...scene import LIGHTMAP_UV_LAYER, BakeObject
@@ -96,6 +96,7 @@ class BakeReport:
             {"group": group.name, "sources": list(group.sources), "pages": [_file(file) for file in of]}
             for group, of in zip(result.groups, groups, strict=True)
         ]
+        notes = [_said(warning) for warning in result.warnings if warning.is_note]
         return cls(
             {
                 "version": REPORT_VERSION,
@@ -103,7 +104,8 @@ class BakeReport:
                 "pages": pages,
                 **({"light_groups": shares} if shares else {}),
                 "solver": _plain(solver),
-                "warnings": [{"name": w.name, "message": w.message} for w in result.warnings],
+                "warnings": [_said(warning) for warning in result.warnings if not warning.is_note],
+                **({"notes": notes} if notes else {}),
                 "seconds": {stage: round(float(taken), 4) for stage, taken in seconds.items()},
                 **({"performance": _plain(result.performance)} if result.performance else {}),
             }
@@ -191,6 +193,10 @@ def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str,
     owners = sorted({bisect_right(firsts, triangle) - 1 for triangle in block["triangles"]})
     names = list(dict.fromkeys(objects[owner].name for owner in owners))
     return {"objects": names, **{key: value for key, value in block.items() if key != "triangles"}}
+
+
+def _said(warning: BakeWarning) -> dict[str, str]:
+    return {"name": warning.name, "message": warning.message}
 
 
 def _file(file: LightmapFile) -> dict[str, Any]:

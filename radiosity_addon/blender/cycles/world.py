@@ -21,7 +21,7 @@ from ...lights import (
 from ..datablocks.image_values import known_means_only
 from ..materials.materials import read_radiance, uses_nodes
 from .lamps import ALL_BOUNCES
-from .world_pixels import world_pixels
+from .world_pixels import camera_pixels, world_pixels
 
 _CORE = 0.05
 """The core of a patch is what is above this fraction of its brightest pixel: a sun without its glow."""
@@ -60,6 +60,23 @@ def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[f
     if len(other_warnings) == len(warnings):
         return _constant(radiance, world.name, dark), other_warnings + limited
     return (yield from _sampled(world.name_full)), other_warnings + limited
+
+
+def seen_background(world: bpy.types.World | None) -> np.ndarray:
+    """Return the radiance that cameras see behind all objects (h, w, 3) [W/m²/sr], as `world_pixels`.
+
+    Raises BakeError if Cycles could not render it.
+    """
+    if world is None:
+        return np.zeros((1, 2, 3))
+    if not uses_nodes(world):
+        radiance = np.array(world.color[:3], dtype=np.float64)
+    else:
+        with known_means_only(None):
+            radiance, warnings = read_radiance(world, "world")
+        if any("volume" not in warning.message for warning in warnings):
+            return camera_pixels(world)
+    return np.broadcast_to(radiance, (1, 2, 3))
 
 
 def _constant(radiance: np.ndarray, name: str, dark: bool) -> list[Light]:

@@ -43,6 +43,15 @@ def world_pixels(
         return look_around(panorama_scene(copy, window), size, f"world '{world.name}'")
 
 
+def camera_pixels(world: bpy.types.World) -> np.ndarray:
+    """Return the radiance of a world as cameras see it, see `world_pixels`; raises BakeError likewise."""
+    with only_for_now():
+        copy = world.copy()
+        if hasattr(copy, "cycles"):
+            copy.cycles.sampling_method = "NONE"
+        return look_around(panorama_scene(copy), (HEIGHT, WIDTH), f"world '{world.name}'")
+
+
 def panorama_scene(world: bpy.types.World | None, window: Bounds = WHOLE_SPHERE) -> bpy.types.Scene:
     """Make a scene that holds nothing but a world, and a camera that looks around."""
     scene = bpy.data.scenes.new("Radiosity World")

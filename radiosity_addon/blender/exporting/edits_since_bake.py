@@ -8,10 +8,11 @@ from collections.abc import Generator
 import bpy
 
 from ...bake import BakeDigests, ShownBake
+from ...bake.scene_diff import light_summaries
 from ...base import RadiosityError
-from ...options import BakeSettings
 from ..apply.rebake import Originals
-from ..apply.shown_bake import shown_bake
+from ..apply.shown_bake import baked_lights, is_as_remembered, remember_content, shown_bake
+from ..relight.relight_properties import relight_of
 from ..scene_export.export import export_steps
 
 
@@ -20,21 +21,27 @@ def edits_since_bake(
 ) -> Generator[float, None, list[str]]:
     """Compare the context's scene with what it remembers of its bake; returns what to note.
 
-    As *Changed* does, but for lamps: the digest of their light is one with that of the bake's settings.
+    Reading the scene as a bake does takes seconds: where the file holds what it held, that is not done.
     Yields fraction: As `export_steps`.
     """
-    objects = json.loads(context.scene.radiosity.baked_objects or "{}")
-    # A bake of an earlier version does not say how finely it looked at textures.
-    resolution = context.scene.radiosity.baked_resolution
-    if not objects or not resolution:
+    scene = context.scene
+    objects, remembered = json.loads(scene.radiosity.baked_objects or "{}"), baked_lights(scene)
+    if not objects or remembered is None or is_as_remembered(scene):
         return []
-    settings = BakeSettings(resolution=resolution)
-    shown = Originals(context)
+    settings, lights = remembered
+    originals = Originals(context)
     try:
-        export = yield from export_steps(context, settings, False, in_background, shown)
+        export = yield from export_steps(context, settings, False, in_background, originals)
     except RadiosityError as error:
         return [f"the scene could not be compared with its bake: {error}"]
-    remembered = shown_bake(context.scene, export) or ShownBake({}, objects)
-    differs = remembered.described(BakeDigests.of(export.bake_scene, settings))
+    shown = shown_bake(scene, export) or ShownBake({}, objects)
+    is_relit = bool(relight_of(scene).strengths)
+    differs = (
+        shown.edits(BakeDigests.of(export.bake_scene, settings))
+        .with_lights(lights, light_summaries(export.bake_scene), strengths=not is_relit)
+        .described
+    )
+    if not differs:
+        remember_content(scene)
     notes = [f"{differs}; the lightmaps show their light of before: bake again"] if differs else []
-    return [*(warning.message for warning in shown.warnings), *notes]
+    return [*(warning.message for warning in originals.warnings), *notes]

@@ -14,12 +14,14 @@ from pathlib import Path
 
 import addon_utils  # type: ignore[import-not-found]
 import bpy
+import numpy as np
 
 from ...bake.result import BakeReport
 from ...base import BakeError, Status, staged
 from ...exports import (
     INDEX_NAME,
     Glb,
+    emission_images,
     emissive_only,
     lightmap_index,
     png_of_linear,
@@ -28,12 +30,15 @@ from ...exports import (
     static_files,
     viewer_page,
     with_lightmaps,
+    write_ktx2,
 )
 from ...files import PLAIN_NAMES, export_record, older_files
 from ...numerics import Array
 from ...options import Form
+from ..cycles.world import seen_background
 from ..datablocks.quiet_output import silenced
 from ..files.output import OutputFolder
+from ..scene_records.render_options import world_of
 from .bake_units import bake_units
 from .edits_since_bake import edits_since_bake
 from .evaluated_colors import evaluate_channel, image_of, side_factor
@@ -42,6 +47,9 @@ from .export_scene import PREFIX, ExportScene, export_scene
 from .exported_lightmaps import ExportedLightmaps, endings, rgbm_names
 
 LIT, BAKED, VIEWER = "scene.glb", "scene_baked.glb", "viewer.html"
+BACKGROUND = "background.ktx2"
+"""In viewer.html: what is behind all objects, around, row 0 at the lowest latitude."""
+
 REPORT_VERSION = 1
 
 
@@ -106,17 +114,15 @@ def run_export(
             files[INDEX_NAME] = lightmap_index(light.index(scene, places, entries)).encode()
             if form.lit_scene:
                 yield Status("baked glTF", 0.8)
-                pages = _light_pages(scene, light, colors)
-                files[BAKED] = emissive_only(written, scene.names, pages).to_bytes()
+                files[BAKED] = _baked(scene, light, colors, written).to_bytes()
         if form.viewer:
-            shown = {name: data for name, data in images.items() if name.endswith(".ktx2")}
-            inside = {LIT: files[LIT], INDEX_NAME: files[INDEX_NAME], **shown}
+            yield Status("background", 0.85)
+            inside = {LIT: files[LIT], INDEX_NAME: files[INDEX_NAME], **_background(context)}
+            inside |= {name: data for name, data in images.items() if name.endswith(".ktx2")}
             files[VIEWER] = viewer_page(context.scene.name, inside)
         yield Status("write", 0.9)
         for name, data in files.items():
-            path = output.staging / name
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(data)
+            _write(output.staging / name, data)
         left = {BAKED, VIEWER, *rgbm_names(light.stems)} - files.keys()
         record = export_record(output.earlier, form.names, lightmaps, light.mix, left)
         output.write_report(BakeReport({"version": REPORT_VERSION, **record}))
@@ -126,6 +132,22 @@ def run_export(
     notes = [f"{name} is of earlier lightmaps" for name in older]
     notes += [f"{name} stays as an earlier export wrote it" for name in kept]
     return ExportReport(tuple(sorted(files)), (*edits, *light.notes, *notes))
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write a file; an OSError names it also where the disk is full."""
+    try:
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(data)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _background(context: bpy.types.Context) -> dict[str, bytes]:
+    """Return the file of what a render shows behind all objects; none where that is transparent."""
+    if context.scene.render.film_transparent:
+        return {}
+    return {BACKGROUND: write_ktx2(seen_background(world_of(context)).astype(np.float32))}
 
 
 _Colors = dict[str, list[Array]]
@@ -230,18 +252,15 @@ def _window_kept(context: bpy.types.Context) -> Iterator[None]:
             window.view_layer = layer
 
 
-def _light_pages(
-    scene: ExportScene, light: ExportedLightmaps, colors: _Colors
-) -> dict[tuple[int, bool], tuple[bytes, float]]:
-    """Return the images of what leaves surfaces, for each page, and for glowing materials apart."""
-    found = {}
+def _baked(scene: ExportScene, light: ExportedLightmaps, colors: _Colors, written: Glb) -> Glb:
+    """Return the file whose surfaces emit what leaves them."""
+    radiance, factors = {}, {}
     for number, page in enumerate(light.pages):
         base = colors[BASE][number]
-        leaving = base * resampled(page, base.shape[1], base.shape[0])
-        for glows in {each.glows for each in scene.materials if each.page == number}:
-            radiance = leaving
-            if glows:
-                radiance = leaving + colors[EMISSION][number]
-            white = max(float(radiance.max(initial=0.0)), 1e-6)
-            found[number, glows] = png_of_linear(radiance / white), white
-    return found
+        radiance[number] = base * resampled(page, base.shape[1], base.shape[0])
+        if EMISSION in colors:  # black where nothing glows
+            radiance[number] += colors[EMISSION][number]
+        factors[number] = base.shape[1] // page.shape[1]
+    images, read_by = emission_images(written, scene.names, radiance, factors)
+    encoded = [(png_of_linear(image.colors), image.white) for image in images]
+    return emissive_only(written, scene.names, encoded, read_by)

@@ -13,10 +13,11 @@ import bpy
 import numpy as np
 
 from ...base import SceneError
-from ...exports import ExportedNames
+from ...exports import ExportedNames, ViewSettings
 from ...scene import LIGHTMAP_UV_LAYER
-from ..datablocks.bake_record import ORIGINAL, remove_datablocks
+from ..datablocks.bake_record import ORIGINAL, is_made, remove_datablocks
 from ..material_copies.material_slots import is_copy
+from ..scene_export.levels_of_detail import levels_of
 from ..stand_ins.stand_ins import STAND_IN
 from .export_materials import ExportMaterial, export_material, group_of_emission
 from .shown_lightmaps import ShownLightmaps, shown_lightmaps
@@ -37,13 +38,17 @@ class ExportScene:
     user_scene: The name of the one that it is of.
     objects mapping of str to Object: The copies by the full names of the user's objects.
     baked: Names of those with a lightmap, with its page.
+    view: How the user's scene is shown.
+    left_out: Names of levels of detail of them that renders hide.
     """
 
     scene: bpy.types.Scene
     user_scene: str
     shown: ShownLightmaps
+    view: ViewSettings
     objects: dict[str, bpy.types.Object] = field(default_factory=dict)
     baked: dict[str, int] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
     materials: list[ExportMaterial] = field(default_factory=list)
     names: ExportedNames = field(default_factory=ExportedNames)
     made: list[bpy.types.ID] = field(default_factory=list)
@@ -69,7 +74,9 @@ def export_scene(context: bpy.types.Context) -> ExportScene:
     """
     shown_objects = list(rendered_objects(context.view_layer))
     shown = shown_lightmaps([obj for obj in shown_objects if obj.type == "MESH"])
-    made = ExportScene(bpy.data.scenes.new("Radiosity Export"), context.scene.name, shown)
+    own = context.scene.view_settings
+    view = ViewSettings(own.view_transform, own.look, own.exposure, own.gamma)
+    made = ExportScene(bpy.data.scenes.new("Radiosity Export"), context.scene.name, shown, view)
     made.made.append(made.scene)
     made.scene[TEMPORARY] = True
     made.scene.frame_set(context.scene.frame_current)
@@ -83,6 +90,10 @@ def export_scene(context: bpy.types.Context) -> ExportScene:
         setattr(made.scene.render, name, getattr(context.scene.render, name))
     try:
         _Copies(made).add(shown_objects)
+        hidden = {obj: None for obj in context.scene.objects if obj.type == "MESH" and not is_made(obj)}
+        for obj in shown_objects:
+            hidden.pop(obj, None)
+        made.left_out = tuple(levels_of(made.baked, [obj.name for obj in hidden]))
     except BaseException:
         made.close()
         raise
@@ -147,7 +158,6 @@ class _Copies:
             self._nodes,
             self._meshes,
             {each.material.name: (each.name, each.page) for each in made.materials},
-            [each.material.name for each in made.materials if each.glows],
             [each.material.name for each in made.materials if each.evaluated],
             self._groups,
         )

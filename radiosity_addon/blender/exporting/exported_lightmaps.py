@@ -68,6 +68,9 @@ class ExportedLightmaps:
         notes = list(dict.fromkeys(note for material in scene.materials for note in material.notes))
         if shown.light == "indirect":
             notes.append("the lightmap holds indirect light: lamps are exported, but glTF has no area lamps")
+        if scene.left_out:
+            named = ", ".join(f"'{name}'" for name in scene.left_out)
+            notes.append(f"levels of detail that are hidden from renders are not exported: {named}")
         uneven = [
             f"{page.shape[1]} × {page.shape[0]}" for page in pages if page.shape[0] % 4 or page.shape[1] % 4
         ]
@@ -141,4 +144,6 @@ class ExportedLightmaps:
             place = places.get(name, LightmapPlace((1.0, 1.0), (0.0, 0.0)))
             nodes.append(NodeEntry(name, page, scale=place.scale, offset=place.offset))
         lamps = [] if self.keeps_lamps else lamps_in(scene.objects)
-        return LightmapIndex(self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes)
+        return LightmapIndex(
+            self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes, scene.view
+        )

@@ -22,7 +22,7 @@ from ..apply.apply import apply_steps
 from ..apply.rebake import EarlierBake, replacing_earlier
 from ..apply.restore import restore
 from ..apply.scopes import files_shown_by, keeping_theirs, of_scene
-from ..apply.shown_bake import remember
+from ..apply.shown_bake import forget_content, remember, remember_content
 from ..datablocks.bake_record import remove_datablocks
 from ..files.output import OutputFolder
 from ..files.saved_files import save_copy
@@ -49,7 +49,7 @@ WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
 
 _MEMORY = {
-    "radiosity": ("last_bake", "baked_light", "baked_objects", "baked_resolution"),
+    "radiosity": last_bake.MEMORY,
     "radiosity_relight": ("mark", "strengths"),
 }
 """What a scene remembers of its bake, by property group."""
@@ -141,7 +141,8 @@ def finish(
             result = replace(result, warnings=(*warnings, *result.warnings))
         # A copy remembers its bake too; the time that is left to do is not in its figures.
         report = _report(result, images, groups, settings, seconds)
-        remember(scene, export, result, digests, settings.resolution)
+        keeps_some = scope is not None and bool(scope.in_scene)
+        remember(scene, export, result, digests, settings, is_partial=keeps_some)
         folder = "" if output is None else "//" if copies else relative_path(output.path)
         last_bake.remember(scene, report.as_dict(), folder)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
@@ -151,6 +152,7 @@ def finish(
         elif output is not None and copies is not None:
             undo.pop_all().close()  # the copy is to hold nothing of the earlier bake
             undo.enter_context(_restored_on_failure(context))
+            remember_content(scene)
             yield Status("save", applying(copies)[1])
             with timed(seconds, "save"):
                 save_copy(output)
@@ -162,6 +164,9 @@ def finish(
             report = output.write_report(_with_sidecar(report, output, keeping))
             yield Status("write", 1.0)
             output.publish()
+    if copies is None:
+        # What was there before has gone by now. Objects that keep theirs may have been edited before.
+        (forget_content if keeps_some else remember_content)(scene)
     if keeping is not None and kept is not None:
         kept_bakes.put(scene, keeping.mark, kept)
     kept_bakes.make_room()

@@ -6,29 +6,23 @@ The name, places of nodes, selections and open panels do not count. Node groups 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection
-from functools import cache
+from collections.abc import Collection
 from operator import attrgetter
-from typing import Any, TypeAlias
+from typing import Any
 
 import bpy
 
 from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.keyed_paths import curves, path_of
+from ..datablocks.plain_values import SIMPLE, StructReader, custom_properties, plain
 from ..images.node_group import BASE_COLOR, DIFFUSE_COLOR, EMISSION
 from ..materials.materials import uses_nodes
 from .copy_marks import COPY_MARKS, FED, FOLLOWS, NODE_MARKS, is_added, is_copied_group
-
-Reader: TypeAlias = Callable[[Any], Any]
-Readers: TypeAlias = tuple[Reader, tuple[tuple[str, Reader], ...]]
 
 _NAME, _IDENTIFIER = attrgetter("name"), attrgetter("identifier")
 _LINK = attrgetter(
     "from_node.name", "from_socket.identifier", "to_node.name", "to_socket.identifier", "is_muted"
 )
-_UI = ("active_", "show_", "bl_")
-
-_SIMPLE = frozenset((bool, int, float, str, type(None)))
 OUTPUTS_WITH_VALUES = {"RGB", "VALUE", "NORMAL"}
 
 _NOT_CONTENT = frozenset(
@@ -42,6 +36,8 @@ _NOT_CONTENT = frozenset(
     )
 )  # fmt: skip
 
+_STRUCTS = StructReader(_NOT_CONTENT - {"name"}, ("active_", "show_", "bl_"))
+
 
 def digest_of_material(material: bpy.types.Material, as_copy: bool = False) -> str:
     """Return the digest of a material.
@@ -50,17 +46,17 @@ def digest_of_material(material: bpy.types.Material, as_copy: bool = False) -> s
         that we added only their links and what the user can set.
     """
     keyed = frozenset(curve.data_path for curve in curves(material))
-    custom = [each for each in _custom(material, COPY_MARKS) if f'["{each[0]}"]' not in keyed]
-    content = [_read(material, _NOT_CONTENT | keyed), custom, _animation(material)]
+    custom = [each for each in custom_properties(material, COPY_MARKS) if f'["{each[0]}"]' not in keyed]
+    content = [_STRUCTS.read(material, _NOT_CONTENT | keyed), custom, _animation(material)]
     if uses_nodes(material):
         content.append(_tree(material.node_tree, as_copy))
     # Drivers of a copy read from the copy what those of the original read from that.
-    return _hash(content, itself=repr(_plain(material)))
+    return _hash(content, itself=repr(plain(material)))
 
 
 def tree_digest(tree: bpy.types.NodeTree, as_copy: bool = False) -> str:
     """Return the digest of a node group, as `digest_of_material`."""
-    return _hash([_interface(tree), _custom(tree, COPY_MARKS), _tree(tree, as_copy)])
+    return _hash([_interface(tree), custom_properties(tree, COPY_MARKS), _tree(tree, as_copy)])
 
 
 def links_of(tree: bpy.types.NodeTree) -> list[tuple[str, str, str, str, bool]]:
@@ -70,13 +66,13 @@ def links_of(tree: bpy.types.NodeTree) -> list[tuple[str, str, str, str, bool]]:
 
 def properties_of_material(material: bpy.types.Material) -> tuple[str, ...]:
     """Return the names of a material's properties that count."""
-    return _names(type(material), _NOT_CONTENT)
+    return _STRUCTS.names(type(material), _NOT_CONTENT)
 
 
 def properties_of_node(struct: bpy.types.bpy_struct) -> tuple[str, ...]:
     """Return the names of the properties of a node, or of a struct in it, that count."""
     without = _BASE_NODE if isinstance(struct, bpy.types.Node) else _NOT_CONTENT - {"name"}
-    return _names(type(struct), without)
+    return _STRUCTS.names(type(struct), without)
 
 
 def animation_of(tree: bpy.types.NodeTree) -> Any:
@@ -104,7 +100,7 @@ def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
     if as_copy and is_added(node):
         return [node.name, kind, _values(_settable(node), keyed)]
     content: list[Any] = [node.name, node.bl_idname, node.label, node.mute]
-    simple, others = _readers(type(node), _BASE_NODE)
+    simple, others = _STRUCTS.readers(type(node), _BASE_NODE)
     content.append(simple(node))
     for identifier, read in others:
         value = getattr(node, identifier)
@@ -118,7 +114,7 @@ def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
     if kind in OUTPUTS_WITH_VALUES:
         content.append(_values(node.outputs, keyed))
     if node.keys():
-        content.append(_custom(node, NODE_MARKS))
+        content.append(custom_properties(node, NODE_MARKS))
     return content
 
 
@@ -135,7 +131,7 @@ def _values(sockets: Any, keyed: set[str]) -> list[Any]:
     if keyed:
         sockets = [socket for socket in sockets if path_of(socket) not in keyed]
     values = [getattr(socket, "default_value", None) for socket in sockets]
-    return [value if type(value) in _SIMPLE else _plain(value) for value in values]
+    return [value if type(value) in SIMPLE else plain(value) for value in values]
 
 
 _BASE_NODE = frozenset(prop.identifier for prop in bpy.types.Node.bl_rna.properties) | _NOT_CONTENT - {
@@ -144,14 +140,9 @@ _BASE_NODE = frozenset(prop.identifier for prop in bpy.types.Node.bl_rna.propert
 
 
 def _interface(tree: bpy.types.NodeTree) -> list[Any]:
-    return [[item.item_type, item.name, _read(item, _NOT_CONTENT)] for item in tree.interface.items_tree]
-
-
-def _custom(owner: Any, marks: tuple[str, ...]) -> list[tuple[str, Any]]:
-    """Return the custom properties, except for ours and those that are registered."""
-    known = owner.bl_rna.properties
-    keys = [key for key in sorted(owner.keys()) if key not in marks and key not in known]
-    return [(key, _plain(owner[key])) for key in keys]
+    return [
+        [item.item_type, item.name, _STRUCTS.read(item, _NOT_CONTENT)] for item in tree.interface.items_tree
+    ]
 
 
 def _animation(owner: bpy.types.ID, ours: Collection[str] = ()) -> Any:
@@ -164,81 +155,15 @@ def _animation(owner: bpy.types.ID, ours: Collection[str] = ()) -> Any:
         (curve.data_path, curve.array_index) for curve in curves(owner) if curve.data_path not in ours
     )
     drivers = sorted(
-        repr((curve.data_path, curve.array_index, curve.mute, _read(curve.driver, _NOT_CONTENT - {"name"})))
+        repr(
+            (
+                curve.data_path,
+                curve.array_index,
+                curve.mute,
+                _STRUCTS.read(curve.driver, _NOT_CONTENT - {"name"}),
+            )
+        )
         for curve in data.drivers
         if curve.data_path not in ours
     )
     return [action, moved, drivers, [track.name for track in data.nla_tracks]]
-
-
-def _read(struct: Any, without: frozenset[str]) -> list[Any]:
-    """Return what a struct's properties hold."""
-    simple, others = _readers(type(struct), without)
-    return [simple(struct), *(read(getattr(struct, name)) for name, read in others)]
-
-
-def _readers(kind: Any, without: frozenset[str]) -> Readers:
-    # Properties can be registered at any time.
-    return _readers_of(kind, without, len(kind.bl_rna.properties))
-
-
-@cache
-def _readers_of(kind: Any, without: frozenset[str], _: int) -> Readers:
-    """Return how to get the plain properties of a kind of struct that count, and each of the others."""
-    plain: list[str] = []
-    others: list[tuple[str, Reader]] = []
-    for prop in kind.bl_rna.properties:
-        name = prop.identifier
-        if name in without or name.startswith(_UI):
-            continue
-        if prop.type == "COLLECTION":
-            others.append((name, _items))
-        elif prop.type == "POINTER":
-            others.append((name, _pointer))
-        elif prop.is_readonly:
-            continue
-        elif getattr(prop, "is_array", False) or getattr(prop, "is_enum_flag", False):
-            others.append((name, _plain))
-        else:
-            plain.append(name)
-    return (attrgetter(*plain) if plain else _nothing), tuple(others)
-
-
-def _names(kind: Any, without: frozenset[str]) -> tuple[str, ...]:
-    found = []
-    for prop in kind.bl_rna.properties:
-        counts = prop.type in ("COLLECTION", "POINTER") or not prop.is_readonly
-        if counts and prop.identifier not in without and not prop.identifier.startswith(_UI):
-            found.append(prop.identifier)
-    return tuple(found)
-
-
-def _nothing(_: Any) -> None:
-    return None
-
-
-def _items(values: Any) -> list[Any]:
-    return [_pointer(value) for value in values]
-
-
-def _pointer(value: Any) -> Any:
-    if value is None or isinstance(value, (bpy.types.ID, bpy.types.Node, bpy.types.NodeSocket)):
-        return _plain(value)
-    return _read(value, _NOT_CONTENT - {"name"})
-
-
-def _plain(value: Any) -> Any:
-    """Return a value of a property as plain data."""
-    if type(value) in _SIMPLE:
-        return value
-    if type(value) is bpy.types.bpy_prop_array and not isinstance(value[0], bpy.types.bpy_prop_array):
-        return value[:]
-    if isinstance(value, bpy.types.ID):
-        return (value.id_type, value.name_full)
-    if isinstance(value, bpy.types.bpy_struct):
-        return getattr(value, "name", "")
-    if isinstance(value, (set, frozenset)):
-        return sorted(value)
-    if hasattr(value, "to_dict"):
-        return repr(value.to_dict())
-    return [_plain(item) for item in value]

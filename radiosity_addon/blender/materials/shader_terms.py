@@ -49,8 +49,8 @@ ROUGH = 0.05
 _IGNORED_WEIGHTS = (  # Principled sockets that should be 0, and what we do instead
     ("Transmission Weight", "transmission is ignored: the surface is baked opaque"),
     ("Subsurface Weight", "subsurface scattering is ignored: the base color is used"),
-    ("Coat Weight", "the coat is ignored"),
-    ("Sheen Weight", "the sheen is ignored"),
+    ("Coat Weight", "the coat is ignored in bounces of light; it is still shown"),
+    ("Sheen Weight", "the sheen is ignored in bounces of light; it is still shown"),
 )
 
 

@@ -99,6 +99,8 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
         glass = sum(name not in baked for name in report["solver"].get("glass", ()))
         left_out = f" ({glass} of glass have no lightmap)" if glass else ""
         self.report({"INFO"}, f"Baked {len(baked)} objects in {taken:.1f} s{left_out}")
+        for note in one_of_each(report.get("notes", ()))[:3]:
+            self.report({"INFO"}, note["message"])
         warnings = one_of_each(report["warnings"])
         for warning in warnings[:3]:
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")

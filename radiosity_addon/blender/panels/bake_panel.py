@@ -202,6 +202,8 @@ class LastBakeSection(Section):
             split = column.split(factor=0.45)
             split.label(text=name)
             split.label(text=value, translate=False)
+        for note in last.notes[:SHOWN_WARNINGS]:
+            draw_text(layout.box(), note, "INFO", context)
         draw_sections(layout, (WarningsSection,), context)
 
 

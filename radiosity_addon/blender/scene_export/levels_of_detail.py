@@ -7,7 +7,7 @@ block, and get its lightmap's coordinates (`bake/levels.py`).
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,7 +51,16 @@ def share_levels(contents: SceneContents) -> None:
             message = (
                 f"{names} {'shows' if len(coarser) == 1 else 'show'} the lightmap of '{base.source.name}'"
             )
-            contents.warnings.append(BakeWarning(base.source.name, f"levels of detail by name: {message}"))
+            said = BakeWarning(base.source.name, f"levels of detail by name: {message}", is_note=True)
+            contents.warnings.append(said)
+
+
+def levels_of(bases: Collection[str], names: Iterable[str]) -> list[str]:
+    """Return the names that say they are of levels of detail of objects with other names."""
+    families = {base if (found := level_in(base)) is None else found[0] for base in bases}
+    return [
+        name for name in names if (found := level_in(name)) and found[0] in families and name not in bases
+    ]
 
 
 def with_levels(chosen: Sequence[Piece], pieces: Sequence[Piece]) -> list[Piece]:

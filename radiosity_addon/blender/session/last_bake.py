@@ -11,6 +11,9 @@ from ...base import one_of_each
 from ...options import METHODS
 from .state import session
 
+MEMORY = ("last_bake", "baked_light", "baked_objects", "baked_lights", "baked_content")
+"""What a scene remembers of its last bake, by the properties of `scene.radiosity`."""
+
 MAX_WARNINGS = 100
 """A scene keeps this many of the last bake's warnings; the report has them all."""
 
@@ -23,6 +26,7 @@ class LastBake(NamedTuple):
     """One of each kind where there are many alike."""
     warning_count: int = 0
     folder: str = ""
+    notes: tuple[str, ...] = ()
 
 
 _parsed: tuple[str, LastBake | None] = "", None
@@ -49,6 +53,7 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
             "seconds": sum(report["seconds"].values()),
             "warnings": [[w["name"], w["message"]] for w in warnings[:MAX_WARNINGS]],
             "warning_count": len(warnings),
+            "notes": [note["message"] for note in one_of_each(report.get("notes", ()))[:MAX_WARNINGS]],
             "folder": folder,
         }
     )
@@ -58,10 +63,8 @@ def forget(scene: bpy.types.Scene) -> None:
     """Drop the scene's memory of its last bake, and all trace of us where nothing else was set."""
     session.kept_details.pop(scene.name_full, None)
     group = scene.radiosity
-    group.property_unset("last_bake")
-    group.property_unset("baked_light")
-    group.property_unset("baked_objects")
-    group.property_unset("baked_resolution")
+    for name in MEMORY:
+        group.property_unset(name)
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity")
@@ -110,6 +113,7 @@ def _parse(text: str) -> LastBake | None:
             warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),
             warning_count=int(record["warning_count"]),
             folder=str(record["folder"]),
+            notes=tuple(map(str, record.get("notes", ()))),
         )
     except (ValueError, KeyError, TypeError):
         return None

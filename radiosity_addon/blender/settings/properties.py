@@ -45,9 +45,14 @@ class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
         description="Objects of the last bake, and their shapes",
         options={"HIDDEN"},
     )
-    baked_resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Baked Resolution",
-        description="Resolution of the last bake: textures are looked at as finely",
+    baked_lights: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Baked Lights",
+        description="Lights of the last bake, and how it read the scene",
+        options={"HIDDEN"},
+    )
+    baked_content: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Baked Content",
+        description="Everything in the file when the lightmaps were known to show its light",
         options={"HIDDEN"},
     )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]

@@ -52,7 +52,7 @@ def digest_of_mesh(mesh: bpy.types.Mesh) -> str:
     found = hashlib.blake2b(digest_size=16)
     record = layer_record(mesh)
     for name, attribute in sorted(_own_attributes(mesh, record), key=lambda found: found[0]):
-        kind, values = attribute.data_type, _bytes_of(attribute)
+        kind, values = attribute.data_type, attribute_bytes(attribute)
         if attribute.name == KEPT_VALUES:  # it was a UV layer, and will be one again
             kind, values = "FLOAT2", np.frombuffer(values, np.float32).reshape(-1, 3)[:, :2].tobytes()
         # Before Blender 5.0, merely reading a UV layer makes the attribute of its pins.
@@ -99,7 +99,8 @@ def _own_attributes(
     return found
 
 
-def _bytes_of(attribute: Any) -> bytes:
+def attribute_bytes(attribute: Any) -> bytes:
+    """Return the values of an attribute of a mesh, or of hair or points; of unknown kinds nothing."""
     if attribute.data_type == "STRING":
         return repr([item.value for item in attribute.data]).encode()
     if attribute.data_type not in _VALUES:
