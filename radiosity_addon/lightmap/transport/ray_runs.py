@@ -62,9 +62,17 @@ def runs_of(points: GatherPoints, variance: Array, chosen: Array, progress: Prog
     expected = partial(_expected_noise, points, variance, chosen)
     fill_chunks(expected, noise, len(chosen), CHUNK, points.threads, progress)
     share = EVEN + (1.0 - EVEN) * noise / max(float(noise.mean()), 1e-300)
-    # Fractions are rounded up as often as they are large, so that the mean stays.
-    runs = np.floor(RUNS * share + np.modf(GOLDEN_RATIO * chosen)[0])
-    return np.clip(runs, 1, MOST_RUNS).astype(np.int64)
+    return np.clip(_rounded(RUNS * share, chosen), 1, MOST_RUNS)
+
+
+def further_runs(count: Array, texel: Array, factor: float) -> Array:
+    """Return (g,) int: how many more runs points at texels take that have some and want times as many."""
+    return np.maximum(_rounded(factor * count, texel), count) - count
+
+
+def _rounded(runs: Array, texel: Array) -> Array:
+    """Round fractions up as often as they are large, so that the mean over texels stays."""
+    return np.floor(runs + np.modf(GOLDEN_RATIO * texel)[0]).astype(np.int64)
 
 
 def _expected_noise(points: GatherPoints, variance: Array, chosen: Array, rows: slice) -> Array:
