@@ -162,8 +162,10 @@ def gather_texels(
     """
     geometry = crossings.geometry
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
+    mean = float(RUNS)
     if kept is not None:
         points.farthest = np.where(kept.unsure, np.inf, kept.before.farthest)
+        mean = kept.before.runs
     runs = _Runs(local, geometry, max(settings.rays // RUNS, 1))
     variance = np.zeros(0)
     for level, (stride, of_level) in enumerate(progress.part(0.0, 1.0 - FIT).each(settings.strides)):
@@ -177,7 +179,7 @@ def gather_texels(
             runs.add(texel, run, stays)
             found.append((run, stays.sources, stays.tints))
         chosen = _choose(points, crossings, kept, stride, settings.support, of_level.part(0.0, 0.15))
-        many = runs_of(points, variance, chosen, of_level.part(0.15, 0.2))
+        many = runs_of(points, variance, chosen, mean, of_level.part(0.15, 0.2))
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
         done = 0.2
