@@ -34,7 +34,7 @@ from .bake_warnings import coincident_counts, of_coincident, of_solution, small_
 from .estimate import estimate_of, refuse_before_unwrapping
 from .layout import lay_out, padding
 from .levels import with_levels
-from .quality import for_error, quality_of, used_settings
+from .quality import MOST_RAYS, for_error, quality_of, used_settings
 from .relight import (
     HierarchyReport,
     IncrementalState,
@@ -340,8 +340,9 @@ def _texel_values(
             bake_scene.scene,
             local,
             geometry,
-            settings_for=lambda error: for_error(error).gather,
-            error=settings.relative_error,
+            for_error(settings.relative_error).gather,
+            settings.relative_error,
+            MOST_RAYS,
             so_far=so_far,
             progress=progress,
         )

@@ -133,8 +133,8 @@ class BakeSettings:
     )
     relative_error: float | None = option(
         None,
-        "Target error of the light, such as 0.02: RMS, relative to the mean. Texels are lit again with more "
-        "rays until the estimate is below it",
+        "Target error of the light, such as 0.02: RMS, relative to the mean. Rays are added until the "
+        "estimate is below it",
         "Quality",
         flag="--error",
         limits=(0.002, 0.2),

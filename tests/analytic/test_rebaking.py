@@ -93,6 +93,20 @@ def test_a_moved_box_gives_what_a_full_bake_gives(
     assert relative(before, expected) > 0.1
 
 
+def test_a_bake_to_an_error_follows_a_move() -> None:
+    """What stays has taken rays in several goes; new points take as many as those in the mean."""
+    settings = replace(SETTINGS, quality="medium", relative_error=0.015)
+    result, before = bake_and_keep(room(), settings)
+    assert before.moves.traced.points.runs > 2.5
+    found, after = bake_moved(before, room(ELSEWHERE, 30.0))
+    points = after.moves.traced.points
+    assert points.runs == pytest.approx(before.moves.traced.points.runs, rel=0.05)
+    expected = pixels(bake(laid_out_as(room(ELSEWHERE, 30.0), before.geometry.uv), settings))
+    assert relative(pixels(found), expected) < 0.015
+    back, _ = bake_moved(after, room())
+    assert relative(pixels(back), pixels(result)) < 0.015
+
+
 def test_it_takes_a_part_of_the_rays(kept: KeptBake, moved: tuple[BakeResult, KeptBake]) -> None:
     assert moved[1].solved.local.caster.rays < 0.4 * kept.solved.local.caster.rays
     assert moved[0].solver["moved"] == ["Box"]

@@ -15,6 +15,7 @@ from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.lightmap.points import smoothing
+from radiosity_addon.lightmap.transport import ray_runs
 from radiosity_addon.lightmap.transport.warm_start import WarmStart
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -52,9 +53,10 @@ def only(*rows: int) -> np.ndarray:
 
 @pytest.fixture(scope="module", autouse=True)
 def _noise_is_not_shared() -> Iterator[None]:
-    """How noise is shared depends on the light it was chosen for (`test_relit_noise.py`)."""
+    """How noise is shared, and where rays go, depends on the light of the bake (`test_relit_noise.py`)."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(smoothing, "PASSES", ())
+        patch.setattr(ray_runs, "EVEN", 1.0)
         yield
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from radiosity_addon.bake.quality import LADDER, for_error
 from radiosity_addon.base.errors import UsageError
-from radiosity_addon.base.progress import Progress
 from radiosity_addon.lightmap.lighting import accuracy
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.transport.gather_links import GatherLinks
@@ -69,28 +68,34 @@ def test_smaller_errors_take_no_fewer_rays() -> None:
     assert errors == sorted(errors, reverse=True)
 
 
-def test_it_looks_harder_until_the_error_is_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Errors that fall like rays^-1/2, but are three times those of the table."""
-    asked = []
+@pytest.mark.parametrize("power", [0.5, 0.65])
+@pytest.mark.parametrize("times", [0.3, 1.0, 3.0, 20.0])
+def test_it_takes_more_rays_until_the_error_is_reached(
+    monkeypatch: pytest.MonkeyPatch, power: float, times: float
+) -> None:
+    """Errors that fall like rays^-1/2, or faster, but are `times` those that the settings are for."""
+    error, rays = 0.02, 64
+    taken: list[float] = []
 
-    def light(_scene, _local, _geometry, settings, so_far, progress):  # type: ignore[no-untyped-def]
-        asked.append(settings.rays)
-        progress.at(0.5)
-        return TexelLight(np.ones((1, 3)), np.ones((1, 3)), 0.48 / settings.rays**0.5)
+    def light(_scene, _local, _geometry, settings, so_far, more_rays, progress):  # type: ignore[no-untyped-def]
+        taken.append(settings.rays)
+        while True:
+            reached = times * error * (rays / taken[-1]) ** power
+            factor = more_rays(reached)
+            if factor <= 1.0:
+                return TexelLight(np.ones((1, 3)), np.ones((1, 3)), reached)
+            taken.append(taken[-1] * factor)
 
     monkeypatch.setattr(accuracy, "light_texels", light)
-    fractions: list[float] = []
-    result = accuracy.light_within(
-        None,
-        None,
-        None,
-        lambda error: GatherSettings(rays=int((0.16 / error) ** 2)),
-        0.02,
-        progress=Progress(lambda status: fractions.append(status.fraction)),
-    )
-    assert result.error <= 0.02
-    assert asked == [64, 711]
-    assert fractions == [0.25, 0.625]  # how often it will look is not known
+    result = accuracy.light_within(None, None, None, GatherSettings(rays=rays), error, 2048)
+    assert taken == sorted(taken)
+    assert taken[-1] <= 2048
+    if times * (rays / 2048) ** power > 1.0:
+        assert taken[-1] == pytest.approx(2048)  # it cannot be had
+    elif len(taken) > 1:
+        assert error / 1.3 <= result.error <= error
+    else:
+        assert result.error <= error
 
 
 @pytest.mark.parametrize("error", [0.0, 0.001, 0.3, float("nan")])

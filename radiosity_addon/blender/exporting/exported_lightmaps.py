@@ -144,6 +144,4 @@ class ExportedLightmaps:
             place = places.get(name, LightmapPlace((1.0, 1.0), (0.0, 0.0)))
             nodes.append(NodeEntry(name, page, scale=place.scale, offset=place.offset))
         lamps = [] if self.keeps_lamps else lamps_in(scene.objects)
-        return LightmapIndex(
-            self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes, scene.view
-        )
+        return LightmapIndex(self.light, entries[0], nodes, groups, lamps, EFFICACY, self.notes, scene.view)

@@ -11,6 +11,7 @@ objects were or are in the way; the sweeps go over all texels, because indirect 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -36,12 +37,16 @@ from ..transport import (
     gather_sub_cells,
     gather_texels,
     sweep,
+    with_more_rays,
 )
 from ..update import PreviousLight, StandingHits, kept_cells, kept_points, texel_gains
 from .partial_light import LightSoFar
 
-DIRECT, CROSSED, PARTS = 0.18, 0.22, 0.88
+DIRECT, CROSSED = 0.18, 0.22
 """How much is done when a part ends; rough, from the office, a classroom and a game's level."""
+
+TRACED = 0.85
+"""How much of what follows is done when all rays are traced, and sweeps begin."""
 
 GATHER_FRACTION = 0.53
 """The part of tracing that gathers at texels."""
@@ -60,6 +65,7 @@ def light_texels(
     settings: GatherSettings,
     previous: PreviousLight | None = None,
     so_far: LightSoFar | None = None,
+    more_rays: Callable[[float], float] | None = None,
     progress: Progress = SILENT,
 ) -> TexelLight:
     """Compute direct and indirect irradiance of all texels.
@@ -76,6 +82,8 @@ def light_texels(
         elements with the light they had, and evaluates every light separately.
     so_far : LightSoFar or None
         Gets intermediate results.
+    more_rays : callable or None
+        Is given the estimated error, and returns how many times as many rays to gather with; 1 is enough.
     """
     reflectance, emission = texel_materials(scene, geometry)
     element = elements_below(local, geometry)
@@ -96,26 +104,41 @@ def light_texels(
     )
     table = HitTable(local, geometry, crossings, uneven_texels(geometry, lamps))
     standing = None if previous is None else StandingHits(previous, table)
-    part = progress.part(CROSSED, PARTS)
+    turns = iter([progress.part(CROSSED, 1.0)])
+    if more_rays is not None:
+        turns = progress.part(CROSSED, 1.0).turns(0.5)
+    turn = next(turns)
+    part = turn.part(0.0, TRACED)
     transport, layout, rows = _trace(table, settings, element, reflectance, standing, so_far, part)
     if standing is None or more is None:
         start = _hierarchy_start(local, element, geometry)
     else:
         start, transport = standing.start(transport, rows, element, more)
     alike = alike_neighbors(geometry, local.caster, crossings.alone, local.threads)
-    light = sweep(
-        transport,
-        start,
-        lamps,
-        local.elements.beyond(),
-        sweeps=settings.sweeps,
-        tolerance=settings.tolerance,
-        threads=local.threads,
-        smooth=SmoothingChoice(geometry, alike),
-        seen=None if so_far is None else so_far.swept,
-        scratch=geometry.scratch,
-        progress=progress.part(PARTS, 1.0),
-    )
+    while True:
+        light = sweep(
+            transport,
+            start,
+            lamps,
+            local.elements.beyond(),
+            sweeps=settings.sweeps,
+            tolerance=settings.tolerance,
+            threads=local.threads,
+            smooth=SmoothingChoice(geometry, alike),
+            seen=None if so_far is None else so_far.swept,
+            scratch=geometry.scratch,
+            progress=turn.part(TRACED, 1.0),
+        )
+        factor = 1.0 if more_rays is None else more_rays(light.error)
+        if factor <= 1.0 or light.table is None:
+            break
+        start = light.table[: len(geometry)]
+        del light
+        turn = next(turns)
+        part = turn.part(0.0, TRACED)
+        transport, layout, rows = with_more_rays(
+            table, transport, layout, rows, factor, element, settings.cell_rays, part
+        )
     # Rays traced again are as many.
     error = light.error if previous is None else previous.traced.error
     light = replace(light, state=crossings.state, error=error)

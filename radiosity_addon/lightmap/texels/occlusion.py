@@ -119,9 +119,7 @@ def find_crossings(
     return result
 
 
-def _find(
-    geometry: TexelGeometry, caster: RayCaster, tested: Array | None, part: slice
-) -> tuple[Array, ...]:
+def _find(geometry: TexelGeometry, caster: RayCaster, tested: Array | None, part: slice) -> tuple[Array, ...]:
     """Return which texels are cut, touched, at a rim and occluded: of all texels, or of those `tested`."""
     rows = np.arange(part.start, part.stop) if tested is None else tested[part]
     lift = SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]

@@ -9,6 +9,7 @@ from .gather_links import GatherLinks
 from .gather_points import STARTS, KeptPoints, gather_footprints, gather_texels, sample_of
 from .gather_settings import GatherSettings
 from .hit_table import HitTable, TableRows
+from .more_rays import with_more_rays
 from .sub_cells import SubCellHits, SubCellLinks, SubCells, gather_sub_cells
 from .sweeps import RelightableTexels, SmoothingChoice, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
@@ -36,4 +37,5 @@ __all__ = [
     "gather_texels",
     "sample_of",
     "sweep",
+    "with_more_rays",
 ]

@@ -7,7 +7,7 @@ may no longer speak for.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..points import GatherPoints, Interpolation, fit, refit
 from ..texels import Crossings, TexelGeometry
 from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
-from .ray_runs import RUNS, Values, over_points, over_rows, runs_of, variance_of
+from .ray_runs import RUNS, Values, further_runs, over_points, over_rows, runs_of, variance_of
 from .traced_texels import GatherPointLayout
 
 CHUNK = 1 << 16
@@ -110,17 +110,39 @@ class _Runs:
         """Return how many lists have been added."""
         return len(self._lists)
 
-    def all(self, spread: Interpolation, points: GatherPoints) -> tuple[GatherLinks, GatherPointLayout]:
-        """Return the links of all runs, given how the points speak for the texels."""
+    def all(
+        self, spread: Interpolation, level: Array, farthest: Array
+    ) -> tuple[GatherLinks, GatherPointLayout]:
+        """Return the links of all runs, given how the points speak for the texels, and their (g,) levels.
+
+        Points are in the order in which the first of their runs were added.
+        """
         texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists, strict=True))
-        count = np.diff(np.append(np.flatnonzero(run == 0), len(run)))
-        layout = GatherPointLayout(
-            texel, np.repeat(points.level, count), run.astype(np.int16), closeness, points.farthest
-        )
-        tints = None if self._tints is None else self._tints.all().reshape(len(run), self.rays, 3)
         aimed = AimedRays.joined(self._aimed, self._first, self._scratch)
+        sources, tints = self._sources.all(), None if self._tints is None else self._tints.all()
+        first = np.flatnonzero(run == 0)
+        point = np.empty(int(texel.max(initial=-1)) + 1, dtype=np.int64)
+        point[texel[first]] = np.arange(len(first))
+        order = np.lexsort((run, point[texel]))
+        if (np.diff(order) != 1).any():
+            # Runs were added to points that had some.
+            place = np.empty(len(order), dtype=np.int64)
+            place[order] = np.arange(len(order))
+            aimed = replace(aimed, row=place[aimed.row])
+            sources = self._in_order(sources, order)
+            tints = None if tints is None else self._in_order(tints, order)
+        texel, run, closeness = texel[order], run[order], closeness[order]
+        count = np.diff(np.append(np.flatnonzero(run == 0), len(run)))
+        layout = GatherPointLayout(texel, np.repeat(level, count), run.astype(np.int16), closeness, farthest)
         rows = over_rows(spread, count, self._scratch)
-        return GatherLinks(self._sources.all(), rows, aimed, tints, layout.run), layout
+        tints = None if tints is None else tints.reshape(len(run), self.rays, 3)
+        return GatherLinks(sources, rows, aimed, tints, layout.run), layout
+
+    def _in_order(self, values: Array, order: Array) -> Array:
+        result = self._scratch.empty(values.shape, values.dtype)
+        for rows in tiles(len(order), CHUNK):
+            result[rows] = values[order[rows]]
+        return result
 
 
 def gather_texels(
@@ -140,8 +162,10 @@ def gather_texels(
     """
     geometry = crossings.geometry
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
+    mean = float(RUNS)
     if kept is not None:
         points.farthest = np.where(kept.unsure, np.inf, kept.before.farthest)
+        mean = kept.before.runs
     runs = _Runs(local, geometry, max(settings.rays // RUNS, 1))
     variance = np.zeros(0)
     for level, (stride, of_level) in enumerate(progress.part(0.0, 1.0 - FIT).each(settings.strides)):
@@ -155,7 +179,7 @@ def gather_texels(
             runs.add(texel, run, stays)
             found.append((run, stays.sources, stays.tints))
         chosen = _choose(points, crossings, kept, stride, settings.support, of_level.part(0.0, 0.15))
-        many = runs_of(points, variance, chosen, of_level.part(0.15, 0.2))
+        many = runs_of(points, variance, chosen, mean, of_level.part(0.15, 0.2))
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
         done = 0.2
@@ -180,7 +204,39 @@ def gather_texels(
         spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     else:
         spread = kept.refitted(points, geometry)
-    return runs.all(spread, points)
+    return runs.all(spread, points.level, points.farthest)
+
+
+def gather_more(
+    local: LocalPass,
+    crossings: Crossings,
+    resolve: Resolver,
+    links: GatherLinks,
+    layout: GatherPointLayout,
+    factor: float,
+    progress: Progress = SILENT,
+) -> tuple[GatherLinks, GatherPointLayout]:
+    """Let the points of links, whose sources are numbers, gather with `factor` times as many rays."""
+    geometry = crossings.geometry
+    runs = _Runs(local, geometry, links.sources.shape[1])
+    sources, tints = runs.more(len(links.sources))
+    sources[:] = links.sources
+    if tints is not None and links.tints is not None:
+        tints[:] = links.tints
+    runs.add(layout.texel, layout.run, GatheredHits(sources, layout.closeness, links.aimed, tints))
+    first = np.flatnonzero(layout.run == 0)
+    texel, count = layout.texel[first], np.diff(np.append(first, len(layout.run)))
+    more = further_runs(count, texel, factor)
+    edge = crossings.crossed[texel]
+    done = 0.0
+    for batch, starts in ((~edge, STARTS), (edge, None)):
+        at, run = np.repeat(texel[batch], more[batch]), run_numbers(more[batch], count[batch])
+        before, done = done, done + len(at) / max(int(more.sum()), 1)
+        into, part = runs.more(len(at)), progress.part(before, done)
+        runs.add(at, run, gather_at(local, geometry, at, starts, runs.rays, resolve, into, part, run))
+    spread = over_points(links.spread, layout)
+    by_point = replace(spread, point=np.searchsorted(first, spread.point).astype(np.int32))
+    return runs.all(by_point, layout.level[first], layout.farthest)
 
 
 def gather_at(

@@ -22,7 +22,7 @@ RUNS = 2
 """Runs of rays of a point, in the mean."""
 
 MOST_RUNS = 16
-"""No point takes more."""
+"""No point takes more, where the mean is `RUNS`."""
 
 EVEN = 0.25
 """This part of the rays is for all points alike; the others are in proportion to the noise expected."""
@@ -50,21 +50,32 @@ def variance_of(sources: Array, tints: Array | None, values: Values) -> Array:
     return result
 
 
-def runs_of(points: GatherPoints, variance: Array, chosen: Array, progress: Progress = SILENT) -> Array:
+def runs_of(
+    points: GatherPoints, variance: Array, chosen: Array, mean: float = RUNS, progress: Progress = SILENT
+) -> Array:
     """Return (c,) int: how many runs each chosen texel takes.
 
     points: Those of coarser levels, …
     variance (g,): … and of each, that of what its rays brought. Without any all take as many.
+    mean: Of the runs of a point.
     """
     if not len(chosen) or not variance.any():
-        return np.full(len(chosen), RUNS)
+        return _rounded(np.full(len(chosen), mean), chosen)
     noise = np.empty(len(chosen))
     expected = partial(_expected_noise, points, variance, chosen)
     fill_chunks(expected, noise, len(chosen), CHUNK, points.threads, progress)
     share = EVEN + (1.0 - EVEN) * noise / max(float(noise.mean()), 1e-300)
-    # Fractions are rounded up as often as they are large, so that the mean stays.
-    runs = np.floor(RUNS * share + np.modf(GOLDEN_RATIO * chosen)[0])
-    return np.clip(runs, 1, MOST_RUNS).astype(np.int64)
+    return np.clip(_rounded(mean * share, chosen), 1, round(MOST_RUNS * mean / RUNS))
+
+
+def further_runs(count: Array, texel: Array, factor: float) -> Array:
+    """Return (g,) int: how many more runs points at texels take that have some and want times as many."""
+    return np.maximum(_rounded(factor * count, texel), count) - count
+
+
+def _rounded(runs: Array, texel: Array) -> Array:
+    """Round fractions up as often as they are large, so that the mean over texels stays."""
+    return np.floor(runs + np.modf(GOLDEN_RATIO * texel)[0]).astype(np.int64)
 
 
 def _expected_noise(points: GatherPoints, variance: Array, chosen: Array, rows: slice) -> Array:

@@ -81,6 +81,7 @@ class SubCellHits:
     sources (p, rays) int32: Numbers of what they hit.
     gains: What lights add, if that is known as well.
     tints (p, rays, 3) float16: As in `GatherLinks`.
+    lamps (p, 3): Irradiance straight from lamps and emissive faces [W/m²], if that is known without gains.
     """
 
     of_element: bool
@@ -88,6 +89,7 @@ class SubCellHits:
     sources: Array
     gains: LightGains | None = None
     tints: Array | None = None
+    lamps: Array | None = None
 
     @property
     def rays(self) -> int:
@@ -102,8 +104,8 @@ class SubCellHits:
     def take(self, chosen: Array) -> SubCellHits:
         """Return those of some cells, row numbers or a mask."""
         gains = None if self.gains is None else self.gains.take(chosen)
-        tints = None if self.tints is None else self.tints[chosen]
-        return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains, tints)
+        tints, lamps = (None if part is None else part[chosen] for part in (self.tints, self.lamps))
+        return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains, tints, lamps)
 
     @staticmethod
     def joined(parts: Sequence[SubCellHits]) -> list[SubCellHits]:
@@ -134,6 +136,7 @@ def gather_sub_cells(
     most_rays: int,
     known: Sequence[SubCellHits] = (),
     progress: Progress = SILENT,
+    renew_coarse: bool = False,
 ) -> tuple[SubCells, TableRows]:
     """Gather from the cells that links met, and from those that these met; return them, and all rows.
 
@@ -143,10 +146,13 @@ def gather_sub_cells(
     reflectance (n, 3): Of the texels.
     most_rays: No cell gathers with more.
     known: Those that need not gather. Those that nothing meets are left out.
+    renew_coarse: Let known cells gather anew if links meet them so often that they should have more rays.
     """
     gathering = _SubCellGather(table, most_rays, known)
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
+    if renew_coarse:
+        gathering.forget_coarse()
     gathering.take_known()
     for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.5).turns(0.5), strict=False):
         if not gathering.gather_new(turn):
@@ -184,6 +190,17 @@ class _SubCellGather:
             # Few of all cells are met by a tile: sums over all of them would take longer than to sort it.
             cells, met = np.unique(number[number >= self._first] - self._first, return_counts=True)
             self._met[cells] = np.minimum(self._met[cells] + met, MOST_MET)
+
+    def forget_coarse(self) -> None:
+        """Forget the known cells that were met so often by now that they should have more rays."""
+        for number, (hits, _) in enumerate(self._known):
+            kept = self._rays(self._met[hits.number - self._first]) <= hits.rays
+            self._known[number] = hits.take(kept), np.zeros(int(kept.sum()), dtype=bool)
+
+    def _rays(self, met: Array) -> Array:
+        """Return (p,) int: with how many rays cells gather, by how often they were met."""
+        step = np.searchsorted([least for least, _ in RAYS_OF_MET], met, side="right") - 1
+        return np.minimum(np.array([rays for _, rays in RAYS_OF_MET])[np.maximum(step, 0)], self._most_rays)
 
     def take_known(self) -> None:
         """Take the known cells that were met, and those that these met in turn.
@@ -239,10 +256,12 @@ class _SubCellGather:
         self._found = {}
         made = []
         for hits, part in progress.each(gathered):
-            if hits.gains is None:
-                gains, lamps = self._lit(hits, part)
-            else:
+            if hits.gains is not None:
                 gains, lamps = hits.gains, table.local.direct.lit_by(hits.gains)
+            elif hits.lamps is not None:
+                gains, lamps = None, hits.lamps
+            else:
+                gains, lamps = self._lit(hits, part)
             of_cells = self._scratch.empty((len(hits.number), 3))
             for tile in tiles(len(of_cells)):
                 of_cells[tile] = table.reflectance(hits.number[tile], hits.of_element, reflectance)

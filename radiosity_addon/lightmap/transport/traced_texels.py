@@ -30,6 +30,11 @@ class GatherPointLayout:
     closeness: Array
     farthest: Array
 
+    @property
+    def runs(self) -> float:
+        """How many runs a point takes in the mean."""
+        return len(self.run) / max(int((self.run == 0).sum()), 1)
+
 
 @dataclass(frozen=True, eq=False)
 class LightingRecord:
