@@ -23,6 +23,7 @@ async function start() {
   const read = async (name) => embedded(name);
   const [shiny, matte] = [await loadLit('scene.glb', { read }), await loadLit('scene.glb', { read, matte: true })];
   const renderer = new WebGLRenderer({ antialias: true });
+  sharpen(renderer, [...shiny.materials.values(), ...matte.materials.values()]);
   document.body.append(renderer.domElement);
   const scene = new Scene();
   scene.background = await background() ?? new Color(0x202224);
@@ -84,6 +85,16 @@ async function start() {
   byId('panel').hidden = false;
   resize();
   Object.assign(window, { viewer: { renderer, scene, camera, controls, shiny, matte, draw, raycaster } });
+}
+
+/** Textures seen at a slant stay sharp along what they are not shrunk across; lightmaps have no mip levels. */
+function sharpen(renderer, materials) {
+  const most = renderer.capabilities.getMaxAnisotropy();
+  for (const material of materials) {
+    for (const name of ['map', 'emissiveMap', 'normalMap', 'roughnessMap', 'metalnessMap']) {
+      if (material[name]) material[name].anisotropy = most;
+    }
+  }
 }
 
 /** What is behind all objects, around: rows of the file from the top, of textures from the bottom. */

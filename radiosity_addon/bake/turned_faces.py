@@ -48,12 +48,16 @@ def of_turned_faces(
     geometry: TexelGeometry,
     light: TexelLight | None,
 ) -> Iterator[BakeWarning]:
-    """Warn of objects that are inside out, and of others that are lit from behind only."""
+    """Warn of objects that are inside out, and of others that are lit from behind only.
+
+    What shines is not dark on its front: a closed bulb is as bright inside as its own light makes it.
+    """
     turned = of_inside_out(bake_scene)
     yield from turned
     front = solution.triangle_irradiance.max(axis=1)
     if light is not None:
         front = front_irradiance(baked, geometry, light, front)
+    front = front + bake_scene.scene.emission.max(axis=1)
     probe = BackProbe(bake_scene.scene, solution.local_pass)
     back = solution.back_irradiance.max(axis=1)
     named = {warning.name for warning in turned}

@@ -37,11 +37,24 @@ def scene(registered: None, tmp_path: Path) -> None:
     curve.dimensions = "3D"
     curve.splines.new("BEZIER").bezier_points.add(1)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("Path", curve))
+    bpy.context.scene["power"] = bpy.context.view_layer["power"] = 1.0
+    paint = next(node for node in cube.data.materials[0].node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    drive(paint.inputs["Emission Strength"], "default_value", "render.resolution_x")
+    cube.shape_key_add(name="Basis")
+    drive(cube.shape_key_add(name="Swollen"), "value", "render.dither_intensity")
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SPOT"))
     bpy.context.scene.collection.objects.link(lamp)
     bpy.context.scene.collection.children.link(bpy.data.collections.new("Lit"))
     bpy.context.view_layer.update()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+
+
+def drive(owner: bpy.types.bpy_struct, name: str, by: str) -> None:
+    """Let a value follow one of the scene's, by its data path."""
+    driver = owner.driver_add(name).driver
+    driver.type = "AVERAGE"  # needs no script
+    target = driver.variables.new().targets[0]
+    target.id_type, target.id, target.data_path = "SCENE", bpy.context.scene, by
 
 
 def cube() -> bpy.types.Object:
@@ -70,6 +83,10 @@ EDITS: dict[str, Callable[[], object]] = {
     "constraint": lambda: setattr(bone().constraints[0], "influence", 0.7),
     "target": lambda: setattr(bone().constraints[0], "target", bpy.data.objects["Lamp"]),
     "driver": lambda: setattr(cube().animation_data.drivers[0].driver, "expression", "2.0"),
+    "driven emission": lambda: setattr(bpy.context.scene.render, "resolution_x", 77),
+    "driven shape key": lambda: setattr(bpy.context.scene.render, "dither_intensity", 0.5),
+    "property of the scene": lambda: bpy.context.scene.__setitem__("power", 2.0),
+    "property of the view layer": lambda: bpy.context.view_layer.__setitem__("power", 2.0),
     "weight": lambda: cube().vertex_groups["Bone"].add([1], 0.6, "REPLACE"),
     "rendered UV layer": lambda: setattr(cube().data.uv_layers["Second"], "active_render", True),
     "UV": lambda: setattr(cube().data.uv_layers["First"].uv[0], "vector", (0.3, 0.4)),

@@ -137,3 +137,32 @@ def test_metal_mirrors_what_is_around(tmp_path: Path) -> None:
     drawn, rendered = (pixels_of(tmp_path / name)[middle] for name in ("viewer.png", "render.png"))
     assert rendered.max() > 0.4
     assert np.quantile(np.abs(drawn - rendered).max(axis=2), 0.8) < 0.1
+
+
+def test_textures_seen_at_a_slant_are_sharp(tmp_path: Path) -> None:
+    """Stripes along the view, on a floor that is shrunk little across them and tenfold along them."""
+    chromium()
+    build(tmp_path / "open.blend", "Standard", 0.0)
+    floor = bpy.data.objects["Floor"]
+    floor.data.uv_layers.new(name="UVMap").data.foreach_set("uv", (0, 0, 1, 0, 1, 1, 0, 1))
+    stripes = bpy.data.images.new("Stripes", 256, 256)
+    columns = np.where(np.arange(256) // 4 % 2, 0.9, 0.1)
+    stripes.pixels.foreach_set(np.repeat(np.tile(columns, 256), 4).astype(np.float32))
+    stripes.pack()
+    tree = floor.data.materials[0].node_tree
+    image = tree.nodes.new("ShaderNodeTexImage")
+    image.image = stripes
+    diffuse = next(node for node in tree.nodes if node.type == "BSDF_DIFFUSE")
+    tree.links.new(image.outputs["Color"], diffuse.inputs["Color"])
+    camera = bpy.context.scene.camera
+    camera.location = (0.0, -4.0, 0.25)
+    camera.rotation_euler = (Vector((0, 0, 0)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    bpy.ops.wm.save_mainfile()
+    radiosity_addon.register()
+    assert main(["bake", str(tmp_path / "open.blend"), "--output", str(tmp_path / "out"), *BAKE]) == 0
+    radiosity_addon.unregister()
+    with viewer(tmp_path / "out" / "export" / "viewer.html", *SIZE) as shown:
+        shown.evaluated("document.getElementById('panel').hidden = true")
+        (tmp_path / "viewer.png").write_bytes(shown.picture())
+    row = pixels_of(tmp_path / "viewer.png")[100, 110:190].mean(axis=1)  # the middle of the floor
+    assert row.max() - row.min() > 0.4 * row.max(), (row.min(), row.max())

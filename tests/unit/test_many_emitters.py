@@ -258,3 +258,15 @@ def test_a_sphere_far_away_sends_by_its_solid_angle() -> None:
     found = table.factors(np.zeros(up.sum(), dtype=int), points[up], normals[up], rise[up], distance[up])
     shown = twice.sum() / 8.0
     np.testing.assert_allclose(found, shown * rise[up] / (np.pi * distance[up] ** 3), rtol=0.005)
+
+
+def test_groups_too_small_to_count_get_no_light_and_no_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers that are rounded up to the end of all light choose them now and then."""
+    specks = 1e-11 * panel(16) + CENTER + (0.5, 0.0, 0.0)
+    lamp = group(np.concatenate([bulb(), specks]), 64, monkeypatch)
+    points, facing = places(2000, 0.6)
+    unit = np.tile((np.nextafter(1.0, 0.0), 0.5), (len(points), 1))
+    with np.errstate(invalid="raise", divide="raise"):
+        _, distances, weights = lamp.rays_from(points, facing, unit)
+    assert np.isfinite(distances).all()
+    assert (weights >= 0.0).all()

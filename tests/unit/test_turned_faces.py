@@ -91,6 +91,17 @@ def test_closed_things_whose_normals_point_inward_are_warned_of(is_turned: bool,
     assert told(found, resolution=128) == (["Frame", "Tub"] if is_turned else [])
 
 
+@pytest.mark.parametrize("shines", [False, True])
+def test_a_closed_bulb_is_not_lit_from_behind(shines: bool) -> None:
+    """Its inside is far brighter than the room, by its own light alone."""
+    walls, _ = box_room((4, 5, 3), 2)
+    bulb = solid_box((1.85, 2.35, 2.35), (2.15, 2.65, 2.65))
+    scene = gray_scene(np.concatenate([walls, bulb]), 0.8, two_sided=True, lights=[] if shines else [LAMP])
+    if shines:
+        scene.emission[len(walls) :] = 5 * np.pi
+    assert told(bake_scene(scene, ("Room", len(walls)), ("Bulb", len(bulb))), resolution=64) == []
+
+
 def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_sides() -> None:
     areas = np.ones(48)
     front, back = np.ones(48), np.zeros(48)

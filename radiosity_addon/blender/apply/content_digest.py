@@ -85,12 +85,14 @@ def _contents() -> Iterator[str]:
     for mesh in _used("meshes"):
         rendered = [layer.name for layer in mesh.uv_layers if layer.active_render]
         rendered.append(str(mesh.color_attributes.render_color_index))
-        yield f"{mesh.name_full} {digest_of_mesh(mesh)} {plain(mesh.materials)} {rendered}"
+        driven = None if mesh.shape_keys is None else _driven(mesh.shape_keys)
+        yield f"{mesh.name_full} {digest_of_mesh(mesh)} {plain(mesh.materials)} {rendered} {driven}"
     for material in _used("materials"):
-        yield f"{material.name_full} {digest_of_material(material)}"
+        driven = None if material.node_tree is None else _driven(material.node_tree)
+        yield f"{material.name_full} {digest_of_material(material)} {_driven(material)} {driven}"
     for tree in _used("node_groups"):
         if not is_made(tree) or is_copied_group(tree):
-            yield f"{tree.name_full} {tree_digest(tree)}"
+            yield f"{tree.name_full} {tree_digest(tree)} {_driven(tree)}"
     for image in _used("images"):
         if not is_made(image):
             yield repr((image.name_full, _image(image)))
@@ -108,7 +110,7 @@ def _datablock(block: bpy.types.ID) -> list[Any]:
         found.append(animation_of(block))
     tree = getattr(block, "node_tree", None)
     if tree is not None:
-        found.append(tree_digest(tree))
+        found += [tree_digest(tree), _driven(tree)]
     if isinstance(block, bpy.types.Object):
         found += [_inputs_of_nodes(each) for each in block.modifiers if each.type == "NODES"]
         if block.pose is not None:
@@ -122,6 +124,22 @@ def _datablock(block: bpy.types.ID) -> list[Any]:
         found += [_STRUCTS.read(keys, _DATABLOCK), animation_of(keys)]
     for attribute in getattr(block, "attributes", ()):
         found.append((attribute.name, hashlib.sha256(attribute_bytes(attribute)).hexdigest()))
+    return found
+
+
+def _driven(owner: bpy.types.ID) -> list[Any]:
+    """Return the values that drivers have set, which digests of materials and shape keys leave out.
+
+    A driver may read what no digest holds, such as a property of the scene. Keyed values need no such list:
+    they follow from the frame.
+    """
+    data = owner.animation_data
+    found = []
+    for curve in () if data is None else data.drivers:
+        try:
+            found.append((curve.data_path, plain(owner.path_resolve(curve.data_path))))
+        except ValueError:  # it drives nothing
+            continue
     return found
 
 
@@ -152,6 +170,7 @@ def _scene(scene: bpy.types.Scene) -> list[Any]:
             plain(getattr(layer, "world_override", None)),
             _STRUCTS.read(layer.layer_collection, _EVALUATED),
             [each.name for each in layer.lightgroups],
+            custom_properties(layer, ()),  # Attribute nodes read them, and those of the scene
         )
         for layer in scene.view_layers
     ]
@@ -166,6 +185,7 @@ def _scene(scene: bpy.types.Scene) -> list[Any]:
         *(plain(each) for each in (scene.world, scene.camera, scene.background_set)),
         simplified,
         render.film_transparent,
+        custom_properties(scene, [name for name in scene.keys() if name.startswith(OURS)]),  # noqa: SIM118
         layers,
         _datablock(scene.collection),
         _STRUCTS.read(scene.cycles, frozenset()) if hasattr(scene, "cycles") else None,

@@ -225,10 +225,12 @@ class EmitterTree:
             along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
             first = self._child[node[rows]]
             one, other = (self._sent(first + step, along) for step in (0, 1))
-            split = one / (one + other)
+            split = one / np.maximum(one + other, 1e-300)
             right = u[rows] >= split
             part = np.where(right, 1.0 - split, split)
-            u[rows] = np.clip((u[rows] - np.where(right, split, 0.0)) / part, 0.0, 1.0 - 1e-12)
+            # A number that was rounded up to 1 chooses a node that sends nothing: with a chance of 0.
+            rest = (u[rows] - np.where(right, split, 0.0)) / np.maximum(part, 1e-300)
+            u[rows] = np.clip(rest, 0.0, 1.0 - 1e-12)
             chance[rows] *= part
             node[rows] = first + right
             rows = rows[self._table[node[rows]] >= 0]

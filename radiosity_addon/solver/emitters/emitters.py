@@ -232,7 +232,9 @@ class EmitterGroup:
         lit, *picked = _pick_by_tree(tree, pairs, points, u[:, None])
         which, node, slot, within, below = (part[:, 0] for part in picked)
         total = np.bincount(pairs.row, pairs.factor, len(points))[lit]
-        part = np.diff(tree.running)[slot] / (tree.running[tree.end[node]] - tree.running[tree.begin[node]])
+        # Sums over all faces may round off what the faces of a node add.
+        whole = tree.running[tree.end[node]] - tree.running[tree.begin[node]]
+        part = np.diff(tree.running)[slot] / np.maximum(whole, 1e-300)
         chance[lit] = pairs.factor[which] / total * below * part
         face[lit], along[lit] = tree.order[slot], within
         return face, along, chance
