@@ -139,7 +139,7 @@ def _bake(
     refuse_large_pages(sizes, settings)
     scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
-        geometry = _texels(bake_scene, baked, atlas, scratch)
+        geometry = texels_of(bake_scene, baked, atlas, scratch)
     give_back()
     # Texels are known now, and the time to light them is about in proportion.
     lighting_seconds = stages.light * len(geometry) / max(sum(plan.texels), 1.0)
@@ -254,7 +254,9 @@ def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
     return [item for item in bake_scene.objects if item.bake and item.count]
 
 
-def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch) -> TexelGeometry:
+def texels_of(
+    bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch
+) -> TexelGeometry:
     """Find the texels that the objects cover, and where they lie in the world."""
     count = len(bake_scene.scene)
     uv = np.zeros((count, 3, 2), dtype=np.float32)

@@ -46,7 +46,7 @@ def test_what_was_traced_stays_and_sequences_go_on(monkeypatch: pytest.MonkeyPat
     room, settings = lit_bake(), BakeSettings(resolution=32)
     baked, scene = pipeline.baked_objects(room), room.scene
     atlas = lay_out(room, baked, settings, SILENT)
-    geometry = pipeline._texels(room, baked, atlas, Scratch())
+    geometry = pipeline.texels_of(room, baked, atlas, Scratch())
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
     factors = iter([FACTOR, 1.0])
     gather = GatherSettings(strides=(2, 1), rays=32)

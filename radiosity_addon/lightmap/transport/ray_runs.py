@@ -86,20 +86,24 @@ def _expected_noise(points: GatherPoints, variance: Array, chosen: Array, rows: 
     return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), variance.mean()))
 
 
-def noise_weights(run: Array) -> tuple[Array, Array]:
-    """Return how means of rows make a sample of their points' noise.
+def runs_with(run: Array) -> Array:
+    """Return (g,) int16: of how many runs each row's point has; they are numbered from 0, point by point."""
+    first = np.flatnonzero(run == 0)
+    count = np.diff(np.append(first, len(run)))
+    return np.repeat(count.astype(np.int16), count)
+
+
+def noise_weights(run: Array, count: Array) -> Array:
+    """Return (r,) float32: times these, means of rows have a sample of the noise for their mean over a point.
 
     The mean of half of a point's runs differs from that of all by about as much as that of all is off.
+    A single run has no halves: 0.
 
-    run (g,) int: Which of its point's runs each row is, one after the other from 0.
-    Returns weights (g,): Of the rows' means: their mean over a point is the sample. And alone (g,) bool: rows
-        of points with a single run, of which half the rays have to do.
+    run, count (r,) int: Which of its point's runs each row is, from 0, and how many these are.
     """
-    start = np.flatnonzero(run == 0)
-    count = np.repeat(np.diff(np.append(start, len(run))), np.diff(np.append(start, len(run))))
     half = np.maximum(count // 2, 1)
     weights = np.where(run < half, count / half, 0.0) - 1.0
-    return weights * np.sqrt(half / np.maximum(count - half, 1)), count == 1
+    return (weights * np.sqrt(half / np.maximum(count - half, 1))).astype(np.float32)
 
 
 def over_rows(spread: Interpolation, runs: Array, scratch: Scratch) -> Interpolation:

@@ -16,7 +16,7 @@ from ...solver.gather import LightGains
 from ..points import Smoothing, choose_smoothing, columns
 from ..texels import TexelGeometry
 from .gather_links import GatherLinks
-from .ray_runs import noise_weights
+from .ray_runs import noise_weights, runs_with
 from .source_means import CHUNK_HITS, SourceMeans, by_channel, mean_of_sources
 from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
@@ -276,10 +276,13 @@ def estimated_noise(
     half = links.sources.shape[1] // 2
     whole = mean_of_sources(table, links.sources, threads, scratch=scratch, tints=links.tints)
     part = mean_of_sources(table, links.sources, threads, half, scratch, links.tints)
-    run = np.zeros(len(part), dtype=np.int16) if links.run is None else links.run
-    weights, alone = noise_weights(run)
+    count = None if links.run is None else runs_with(links.run)
     for rows in tiles(len(part)):
-        part[rows] = np.where(alone[rows, None], part[rows] - whole[rows], weights[rows, None] * whole[rows])
+        part[rows] -= whole[rows]
+        if links.run is not None and count is not None:
+            several = np.flatnonzero(count[rows] > 1)
+            weights = noise_weights(links.run[rows][several], count[rows][several])
+            part[rows][several] = weights[:, None] * whole[rows][several]
     del whole
     return links.spread(part, scratch=scratch)
 
