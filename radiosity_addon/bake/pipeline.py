@@ -1,7 +1,4 @@
-"""The bake as prose: unwrap, rasterize, solve, light the texels, encode.
-
-Canceled or failed, nothing outside was touched.
-"""
+"""The bake as prose: unwrap, rasterize, solve, light, encode. Canceled or failed, it touched nothing else."""
 
 from __future__ import annotations
 
