@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, page_size
+from ..lights import Lamp
 from ..numerics import Array, give_back, thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
@@ -40,11 +41,15 @@ close together has small charts, and texels next to others are divided."""
 MOST_AT_EDGES = 700.0
 """All texels are next to others where charts are small; more rays than these none of them takes."""
 
-RAYS = {"sketch": 0.35, "draft": 0.55, "medium": 1.0, "high": 2.2}
-"""Times as many rays."""
+RAYS = {"sketch": 0.48, "draft": 0.67, "medium": 1.0, "high": 1.65}
+"""Times as much work: finer points share what is done once."""
 
-SECONDS_A_RAY = 0.9e-6
-"""On two cores, with all that is done with what a ray meets."""
+SECONDS_A_RAY, SECONDS_A_SOURCE = 0.25e-6, 18e-6
+"""On two cores: of a ray, with all that is done with what it meets; of a texel for each lamp, bright patch
+of the sky and emissive object. Fitted to the Cornell box, an office, homes, a classroom and a staircase."""
+
+MOST_SOURCES = 64
+"""More are grouped."""
 
 SOLVE_SECONDS = {"sketch": 0.055, "draft": 0.07, "medium": 0.07, "high": 0.07}
 """Time to solve a scene of one triangle; others by the number of triangles to the power 0.45."""
@@ -55,7 +60,7 @@ UNWRAP_SECONDS, KEPT_SECONDS = 25e-6, 3e-6
 FIND_SECONDS, FIND_KEPT_SECONDS, FIND_TEXEL_SECONDS = 15e-6, 3e-6, 7e-6
 """The same to be found again on the page, and each texel's."""
 
-ENCODE_SECONDS, REPORT_SECONDS = 1.5e-6, 20e-6
+ENCODE_SECONDS, REPORT_SECONDS = 1.5e-6, 6e-6
 """A texel's time to be put on its page, with its seams, and an unwrapped triangle's to be reported on."""
 
 CORES = 2
@@ -150,6 +155,7 @@ def estimate_bake(
     settings: BakeSettings,
     faces: int | None = None,
     textures: float = 0.0,
+    sources: int = 1,
 ) -> Estimate:
     """Reckon what a bake will be.
 
@@ -157,6 +163,7 @@ def estimate_bake(
     triangles: Of the whole scene, what only lights and blocks among them.
     faces: Their sides that take part in the light; None for both of each.
     textures: What evaluating the materials will take [bytes]: 0 once that is done.
+    sources: Lamps, bright patches of the sky and emissive objects.
     """
     faces = 2 * triangles if faces is None else faces
     thinned = _thinned(objects, settings)
@@ -175,7 +182,7 @@ def estimate_bake(
     of_scene = waiting_bytes(triangles, faces)
     most = max(room(settings) - textures - of_scene, least_bytes(pages, settings))
     kept = sum(item.triangles for item in objects if item.keeps_uvs)
-    stages = _stages(triangles, kept, total, rays, settings)
+    stages = _stages(triangles, kept, total, rays, sources, settings)
     known = settings.method == "hierarchical" and settings.relative_error is None
     in_memory = min(of_texels, most)
     densities = tuple(
@@ -210,17 +217,24 @@ def estimate_of(bake_scene: BakeScene, settings: BakeSettings) -> Estimate:
         for item in bake_scene.objects
         if item.bake and item.count
     ]
-    return estimate_bake(objects, len(bake_scene.scene), settings)
+    scene = bake_scene.scene
+    emits = scene.emission.any(axis=1)
+    sources = sum(isinstance(light, Lamp) for light in scene.lights)
+    sources += sum(bool(emits[item.rows].any()) for item in bake_scene.objects)
+    return estimate_bake(objects, len(scene), settings, sources=sources)
 
 
-def _stages(triangles: int, kept: int, texels: float, rays: float, settings: BakeSettings) -> StageSeconds:
+def _stages(
+    triangles: int, kept: int, texels: float, rays: float, sources: int, settings: BakeSettings
+) -> StageSeconds:
     """Return how long stages take. `kept` of the triangles keep their layout; `rays` are those of medium."""
+    lighting = SECONDS_A_RAY * rays + SECONDS_A_SOURCE * texels * min(sources, MOST_SOURCES)
     parallel = (CORES / thread_count(settings.threads)) ** 0.6
     return StageSeconds(
         unwrap=UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept,
         rasterize=FIND_SECONDS * (triangles - kept) + FIND_KEPT_SECONDS * kept + FIND_TEXEL_SECONDS * texels,
         solve=parallel * SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45,
-        light=parallel * SECONDS_A_RAY * RAYS[settings.quality] * rays,
+        light=parallel * RAYS[settings.quality] * lighting,
         encode=ENCODE_SECONDS * texels + REPORT_SECONDS * (triangles - kept),
     )
 

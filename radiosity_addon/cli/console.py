@@ -140,10 +140,9 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     )
     if solver.get("estimated_error") is not None:
         lines.append(f"estimated error: {solver['estimated_error']:.2%} of the mean light (RMS)")
-    if solver.get("closure_area_mean") is not None:
-        lines.append(
-            f"share of light that meets a surface: {solver['closure_area_mean']:.4f} (closed scenes: 1)"
-        )
+    power = solver.get("power_W", {})
+    if power.get("emitted") and "escaped" in power:
+        lines.append(f"light that leaves the scene: {power['escaped'] / power['emitted']:.1%}")
     if solver.get("glass"):
         lines.append(_of_glass(solver["glass"], solver.get("power_W")))
     seconds = report["seconds"]

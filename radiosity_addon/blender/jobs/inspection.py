@@ -28,6 +28,7 @@ from ...bake import (
 )
 from ...base import RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
+from ...lights import Lamp
 from ...numerics import folder as scratch_folder
 from ...numerics import give_back
 from ...options import BakeSettings
@@ -159,7 +160,10 @@ def inspect(
     faces = lit_sides(collected.pieces, collected)
     give_back()
     textures = foreseen_bytes(collected.surfaces, settings)
-    plan = estimate_bake(lit, triangles, settings, faces, textures)
+    emits = np.array([surface.emission.any() for surface in collected.surfaces], dtype=bool)
+    sources = sum(isinstance(light, Lamp) for light in collected.lights)
+    sources += sum(bool(emits[piece.surface].any()) for piece in collected.pieces)
+    plan = estimate_bake(lit, triangles, settings, faces, textures, sources)
     findings += _of_memory(plan, triangles, faces, textures, settings)
     refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
     if refused is not None:

@@ -102,9 +102,10 @@ def _parse(text: str) -> LastBake | None:
         if len(solver.get("independent_sets", ())) > 1:
             # Parts that exchange no light, such as closed rooms, each solved by itself.
             figures.append(("Separate Parts", f"{len(solver['independent_sets']):,}"))
-        if solver.get("closure_area_mean") is not None:
-            # The share of light that meets a surface: 1 in a closed scene, less where it may leave.
-            figures.append(("Light Kept", f"{solver['closure_area_mean']:.2%}"))
+        power = solver.get("power_W", {})
+        if power.get("emitted") and "escaped" in power:
+            # All in a closed scene, less where light may leave.
+            figures.append(("Light Kept", f"{max(1.0 - power['escaped'] / power['emitted'], 0.0):.1%}"))
         if solver.get("glass"):
             # Objects that light goes straight through.
             figures.append(("Glass", f"{len(solver['glass']):,}"))
