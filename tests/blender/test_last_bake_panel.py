@@ -12,7 +12,10 @@ from tests.blender.note_layout import NoteLayout, Notes, labels
 pytestmark = pytest.mark.usefixtures("registered")
 
 SOLVER = {
-    **{"method": "hierarchical", "elements": 12345, "links": 678, "rays": 9},
+    "method": "hierarchical",
+    "elements": 12345,
+    "links": 678,
+    "rays": 9,
     "power_W": {"emitted": 8.0, "absorbed": 6.0, "escaped": 2.0},
 }
 
