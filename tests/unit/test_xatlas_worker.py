@@ -67,9 +67,9 @@ def test_meshes_cut_together_have_the_charts_that_they_have_alone(bowl: Mesh) ->
 
 @pytest.mark.parametrize(
     ("triangles", "in_window", "processes"),
-    [(2000, True, 0), (2001, True, 3), (20_000, False, 0), (20_001, False, 3)],
+    [(12, True, 3), (2001, True, 3), (20_000, False, 0), (20_001, False, 3)],
 )
-def test_only_long_work_starts_processes(
+def test_long_work_and_all_next_to_a_window_has_processes(
     bowl: Mesh, triangles: int, in_window: bool, processes: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[XatlasProcess] = []
@@ -87,6 +87,31 @@ def test_without_another_process_the_work_is_done_here(
     with growers.PatientGrower(60.0, 10**6, threads=1) as grower:
         uv, chart = grower(*meshes)
     expected = growers.grow_charts(*meshes)
+    np.testing.assert_array_equal(uv, expected[0])
+    np.testing.assert_array_equal(chart, expected[1])
+
+
+def test_a_process_that_crashes_is_replaced(bowl: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is cut in this process, which a second crash would end."""
+    started: list[subprocess.Popen[bytes]] = []
+    start = xatlas_worker.start_process
+
+    def crashing() -> subprocess.Popen[bytes]:
+        if not started:
+            program = [sys.executable, "-c", "import os; os.abort()"]
+            started.append(subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
+        else:
+            started.append(start())
+        return started[-1]
+
+    meshes = two_of(bowl)
+    expected = growers.grow_charts(*meshes)
+    monkeypatch.setattr(xatlas_worker, "start_process", crashing)
+    monkeypatch.setattr(growers, "grow_charts", None)
+    with growers.PatientGrower(60.0, 12, threads=1, in_window=True) as grower:
+        uv, chart = grower(*meshes)
+    assert len(started) == 2
+    assert all(process.poll() is not None for process in started)
     np.testing.assert_array_equal(uv, expected[0])
     np.testing.assert_array_equal(chart, expected[1])
 

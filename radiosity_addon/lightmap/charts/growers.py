@@ -18,8 +18,9 @@ from .xatlas_worker import XatlasProcess, run_xatlas
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-WORTH_A_PROCESS, WORTH_PROCESSES = 2_000, 20_000
-"""More triangles are cut in other processes, while a window is drawn and otherwise: starting takes time."""
+WORTH_PROCESSES = 20_000
+"""More triangles are cut in other processes: starting takes time. Next to a window all are, for a crash
+of xatlas, which is rare, would take unsaved work with it."""
 
 resting = DelayedRelease()
 """The latest of xatlas' atlases: destroyed right after their work they may hang."""
@@ -48,9 +49,8 @@ class PatientGrower:
     """
 
     def __init__(self, seconds: float, triangles: int = 0, threads: int = 1, in_window: bool = False) -> None:
-        """Start no process before it is needed, and none for few triangles."""
-        worth = triangles > (WORTH_A_PROCESS if in_window else WORTH_PROCESSES)
-        processes = thread_count(threads) if worth else 0
+        """Start no process before it is needed, and none for few triangles without a window."""
+        processes = thread_count(threads) if in_window or triangles > WORTH_PROCESSES else 0
         self.gave_up: set[int] = set()
         self._seconds, self._lock, self._closed = seconds, threading.Lock(), False
         self._spent: dict[int, float] = {}
@@ -67,8 +67,10 @@ class PatientGrower:
 
     def close(self) -> None:
         """End the processes, whatever they are doing; calls that wait for them raise `Cancelled`."""
-        self._closed = True
-        for process in self._processes:
+        with self._lock:
+            self._closed = True
+            processes = list(self._processes)
+        for process in processes:
             process.close()
 
     def __call__(self, vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
@@ -96,6 +98,10 @@ class PatientGrower:
             process = self._idle.get()
             try:
                 found = process.run(vertices, faces, mesh)
+                if found is None and not self._closed:
+                    # xatlas may have crashed, which hardly happens twice.
+                    process = self._another()
+                    found = process.run(vertices, faces, mesh)
             finally:
                 self._idle.put(process)
             if self._closed:
@@ -103,6 +109,15 @@ class PatientGrower:
             if found is not None:
                 return found
         return grow_charts(vertices, faces, mesh)
+
+    def _another(self) -> XatlasProcess:
+        process = XatlasProcess()
+        with self._lock:
+            self._processes.append(process)
+            closed = self._closed
+        if closed:
+            process.close()
+        return process
 
     def _count_time(self, mesh: Int, seconds: float) -> None:
         """Share time out by triangles."""
