@@ -69,7 +69,7 @@ CORES = 2
 KEPT_RAYS = {"sketch": 0.5, "draft": 0.7, "medium": 1.0, "high": 1.6}
 """Times as many rays of which is kept what they met, …"""
 
-BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 20.0, 380.0, 40.0, 30e6
+BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 7.5, 20.0, 380.0, 40.0, 30e6
 """… memory of texels, which is in files beyond the memory limit: what a ray met is kept while light is swept,
 more of it in small charts, as with rays; where texels lie, and their light; the pages."""
 
