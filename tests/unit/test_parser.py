@@ -345,7 +345,7 @@ def test_summary_says_where_how_long_and_what_to_look_at() -> None:
             "elements": 1200,
             "links": 34000,
             "rays": 5,
-            "closure_area_mean": 0.99871,
+            "power_W": {"emitted": 80.0, "absorbed": 60.0, "escaped": 20.1},
         },
         "seconds": {"export": 0.25, "solve": 1.5},
         "warnings": [{"name": "Glass", "message": "not understood; gray used instead"}],
@@ -356,11 +356,11 @@ def test_summary_says_where_how_long_and_what_to_look_at() -> None:
         "baked.blend",
         "hierarchical: 1,200 elements",
         "34,000 links",
-        "0.9987",
+        "light that leaves the scene: 25.1%",
     ):
         assert part in text
     for part in (
-        "0.9987",
+        "light that leaves the scene: 25.1%",
         "export",
         "0.25 s",
         "solve",
