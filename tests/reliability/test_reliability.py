@@ -55,6 +55,8 @@ def test_full_disk(tmp_path: Path) -> None:
     """The folder for temporary files without inodes, and both folders full; mounting them takes root."""
     if not full_disk.can_mount():
         pytest.skip("file systems cannot be mounted here")
+    if Path(sys.executable).is_relative_to("/tmp"):
+        pytest.skip("this Python is in /tmp, which is mounted over")
     log = ROOT / "out" / "reliability" / "disk-few.jsonl"
     log.unlink(missing_ok=True)
     assert full_disk.enter(["disk", "--count", "2", "--name", log.stem]) == 0, log.read_text()
