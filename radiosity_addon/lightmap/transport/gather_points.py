@@ -19,7 +19,16 @@ from ..points import GatherPoints, Interpolation, fit, refit
 from ..texels import Crossings, TexelGeometry
 from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
-from .ray_runs import RUNS, Values, further_runs, over_points, over_rows, runs_of, variance_of
+from .ray_runs import (
+    RUNS,
+    Values,
+    further_runs,
+    over_points,
+    over_rows,
+    points_of,
+    runs_of,
+    variance_of,
+)
 from .traced_texels import GatherPointLayout
 
 CHUNK = 1 << 16
@@ -100,10 +109,9 @@ class _Runs:
     def points(self, first_list: int) -> tuple[Array, Array]:
         """Return the texels of the points added since a list, and how close things are to them."""
         texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists[first_list:], strict=True))
-        start = np.flatnonzero(run == 0)
+        start, count = points_of(run)
         if not len(start):
             return texel, closeness
-        count = np.diff(np.append(start, len(run)))
         return texel[start], np.add.reduceat(closeness, start) / count
 
     def count(self) -> int:
@@ -120,7 +128,7 @@ class _Runs:
         texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists, strict=True))
         aimed = AimedRays.joined(self._aimed, self._first, self._scratch)
         sources, tints = self._sources.all(), None if self._tints is None else self._tints.all()
-        first = np.flatnonzero(run == 0)
+        first, _ = points_of(run)
         point = np.empty(int(texel.max(initial=-1)) + 1, dtype=np.int64)
         point[texel[first]] = np.arange(len(first))
         order = np.lexsort((run, point[texel]))
@@ -132,7 +140,7 @@ class _Runs:
             sources = self._in_order(sources, order)
             tints = None if tints is None else self._in_order(tints, order)
         texel, run, closeness = texel[order], run[order], closeness[order]
-        count = np.diff(np.append(np.flatnonzero(run == 0), len(run)))
+        _, count = points_of(run)
         layout = GatherPointLayout(texel, np.repeat(level, count), run.astype(np.int16), closeness, farthest)
         rows = over_rows(spread, count, self._scratch)
         tints = None if tints is None else tints.reshape(len(run), self.rays, 3)
@@ -195,9 +203,8 @@ def gather_texels(
             found.append((run, *into))
         if values is not None and level + 1 < len(settings.strides):
             of_runs = np.concatenate([variance_of(sources, tints, values) for _, sources, tints in found])
-            start = np.flatnonzero(np.concatenate([run for run, _, _ in found]) == 0)
+            start, count = points_of(np.concatenate([run for run, _, _ in found]))
             if len(start):
-                count = np.diff(np.append(start, len(of_runs)))
                 variance = np.append(variance, np.add.reduceat(of_runs, start) / count)
         points.add(stride, *runs.points(lists))
     if kept is None:
@@ -224,8 +231,8 @@ def gather_more(
     if tints is not None and links.tints is not None:
         tints[:] = links.tints
     runs.add(layout.texel, layout.run, GatheredHits(sources, layout.closeness, links.aimed, tints))
-    first = np.flatnonzero(layout.run == 0)
-    texel, count = layout.texel[first], np.diff(np.append(first, len(layout.run)))
+    first, count = points_of(layout.run)
+    texel = layout.texel[first]
     more = further_runs(count, texel, factor)
     edge = crossings.crossed[texel]
     done = 0.0

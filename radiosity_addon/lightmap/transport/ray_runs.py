@@ -86,10 +86,15 @@ def _expected_noise(points: GatherPoints, variance: Array, chosen: Array, rows: 
     return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), variance.mean()))
 
 
-def runs_with(run: Array) -> Array:
-    """Return (g,) int16: of how many runs each row's point has; they are numbered from 0, point by point."""
+def points_of(run: Array) -> tuple[Array, Array]:
+    """Return (p,) the first row of each point, and how many it has, of rows with run numbers (g,) from 0."""
     first = np.flatnonzero(run == 0)
-    count = np.diff(np.append(first, len(run)))
+    return first, np.diff(np.append(first, len(run)))
+
+
+def runs_with(run: Array) -> Array:
+    """Return (g,) int16: how many runs the point of each row has, see `points_of`."""
+    _, count = points_of(run)
     return np.repeat(count.astype(np.int16), count)
 
 

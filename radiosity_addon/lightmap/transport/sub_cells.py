@@ -222,15 +222,13 @@ class _SubCellGather:
         new = np.flatnonzero((self._met > 0) & ~self._gathered)
         self._gathered[new] = True
         number = new + self._first
-        step = np.searchsorted([met for met, _ in RAYS_OF_MET], self._met[new], side="right") - 1
-        is_elements = number < self._table.first_cell
+        rays_of, is_elements = self._rays(self._met[new]), number < self._table.first_cell
         groups = [
-            (of_element, rays, number[(is_elements == of_element) & (step == own)])
+            (of_element, rays, number[(is_elements == of_element) & (rays_of == rays)])
             for of_element in (True, False)
-            for own, (_, rays) in enumerate(RAYS_OF_MET)
+            for rays in sorted({min(rays, self._most_rays) for _, rays in RAYS_OF_MET})
         ]
-        for (of_element, wanted, cells), part in progress.each(groups):
-            rays = min(wanted, self._most_rays)
+        for (of_element, rays, cells), part in progress.each(groups):
             for tile, of_tile in part.each(list(tiles(len(cells)))):
                 found = self._found.get((of_element, rays))
                 if found is None:
