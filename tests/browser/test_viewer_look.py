@@ -57,6 +57,20 @@ def pixels_of(path: Path) -> np.ndarray:
     return found.reshape(height, width, -1)[..., :3]
 
 
+def bake_and_render(folder: Path, samples: int, matte: bool = False) -> None:
+    """Bake and export `open.blend` into `out`, and render what was baked into `render.png`."""
+    radiosity_addon.register()
+    assert main(["bake", str(folder / "open.blend"), "--output", str(folder / "out"), *BAKE]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "out" / "baked.blend"))
+    if matte:
+        show_lightmaps("matte")
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples = "CYCLES", samples
+    scene.render.filepath = str(folder / "render.png")
+    bpy.ops.render.render(write_still=True)
+    radiosity_addon.unregister()
+
+
 @pytest.mark.parametrize(
     ("transform", "exposure", "largest"),
     [("Standard", -0.7, 0.02), ("AgX", 0.5, 0.05), ("Filmic", 0.0, 0.15)],
@@ -67,15 +81,7 @@ def test_the_first_picture_is_the_render(
     """Filmic, which three.js does not have, is only about as bright."""
     chromium()
     build(tmp_path / "open.blend", transform, exposure)
-    radiosity_addon.register()
-    assert main(["bake", str(tmp_path / "open.blend"), "--output", str(tmp_path / "out"), *BAKE]) == 0
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "baked.blend"))
-    show_lightmaps("matte")
-    scene = bpy.context.scene
-    scene.render.engine, scene.cycles.samples = "CYCLES", 4
-    scene.render.filepath = str(tmp_path / "render.png")
-    bpy.ops.render.render(write_still=True)
-    radiosity_addon.unregister()
+    bake_and_render(tmp_path, samples=4, matte=True)
     with viewer(tmp_path / "out" / "export" / "viewer.html", *SIZE) as shown:
         shown.evaluated("document.getElementById('panel').hidden = true")
         (tmp_path / "viewer.png").write_bytes(shown.picture())
@@ -116,14 +122,7 @@ def test_metal_mirrors_what_is_around(tmp_path: Path) -> None:
     direction = Vector((0, 0, 0.8)) - bpy.context.scene.camera.location
     bpy.context.scene.camera.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
     bpy.ops.wm.save_mainfile()
-    radiosity_addon.register()
-    assert main(["bake", str(tmp_path / "open.blend"), "--output", str(tmp_path / "out"), *BAKE]) == 0
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "baked.blend"))
-    scene = bpy.context.scene
-    scene.render.engine, scene.cycles.samples = "CYCLES", 64
-    scene.render.filepath = str(tmp_path / "render.png")
-    bpy.ops.render.render(write_still=True)
-    radiosity_addon.unregister()
+    bake_and_render(tmp_path, samples=64)
     with viewer(tmp_path / "out" / "export" / "viewer.html", *SIZE) as shown:
         shown.evaluated("document.getElementById('panel').hidden = true")
         (tmp_path / "viewer.png").write_bytes(shown.picture())
