@@ -8,9 +8,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+import xatlas
 
 from radiosity_addon.base import Cancelled, Progress, Status
 from radiosity_addon.lightmap.charts import cut_charts, growers, xatlas_worker
+from radiosity_addon.lightmap.charts.box_charts import box_charts
 from radiosity_addon.lightmap.charts.cut_charts import Charts, unwrap
 from radiosity_addon.lightmap.charts.xatlas_worker import XatlasProcess
 from radiosity_addon.numerics import numbered
@@ -46,8 +48,7 @@ def two_of(bowl: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_another_process_gives_the_same_charts_time_after_time(bowl: Mesh, process: XatlasProcess) -> None:
     meshes = two_of(bowl)
-    atlas, uv, chart = xatlas_worker.run_xatlas(*meshes)
-    growers.resting.keep(atlas)
+    uv, chart = growers.grow_charts(*meshes)
     for _ in range(2):
         found = process.run(*meshes)
         assert found is not None
@@ -63,6 +64,21 @@ def test_meshes_cut_together_have_the_charts_that_they_have_alone(bowl: Mesh) ->
         of = mesh == number
         alone = growers.grow_charts(vertices, faces[of], mesh[of])[1]
         np.testing.assert_array_equal(numbered(chart[of]), numbered(alone))
+
+
+def test_no_atlas_has_a_second_mesh(bowl: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Adding it may crash xatlas."""
+    added: list[xatlas.Atlas] = []
+
+    class RecordingAtlas(xatlas.Atlas):
+        def add_mesh(self, *mesh: object) -> None:
+            added.append(self)
+            super().add_mesh(*mesh)
+
+    monkeypatch.setattr(xatlas, "Atlas", RecordingAtlas)
+    growers.grow_charts(*two_of(bowl))
+    assert len(added) == 2
+    assert added[0] is not added[1]
 
 
 @pytest.mark.parametrize(
@@ -91,29 +107,59 @@ def test_without_another_process_the_work_is_done_here(
     np.testing.assert_array_equal(chart, expected[1])
 
 
-def test_a_process_that_crashes_is_replaced(bowl: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing is cut in this process, which a second crash would end."""
+# Says that it works, reads a little of its input, and crashes.
+CRASHING = "import os; os.write(1, bytes(8)); os.read(0, 8); os.abort()"
+
+
+def crash_some_processes(
+    monkeypatch: pytest.MonkeyPatch, crashing: set[int]
+) -> list[subprocess.Popen[bytes]]:
+    """Make the processes of these numbers, in the order they are started, crash; return those started."""
     started: list[subprocess.Popen[bytes]] = []
     start = xatlas_worker.start_process
 
-    def crashing() -> subprocess.Popen[bytes]:
-        if not started:
-            program = [sys.executable, "-c", "import os; os.abort()"]
-            started.append(subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
+    def started_process() -> subprocess.Popen[bytes]:
+        if len(started) in crashing:
+            pipe = subprocess.PIPE
+            started.append(subprocess.Popen([sys.executable, "-c", CRASHING], stdin=pipe, stdout=pipe))
         else:
             started.append(start())
         return started[-1]
 
+    monkeypatch.setattr(xatlas_worker, "start_process", started_process)
+    # In this process a crash would end Blender.
+    monkeypatch.setattr(growers, "grow_charts", None)
+    return started
+
+
+def test_a_process_that_crashes_is_replaced(bowl: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     meshes = two_of(bowl)
     expected = growers.grow_charts(*meshes)
-    monkeypatch.setattr(xatlas_worker, "start_process", crashing)
-    monkeypatch.setattr(growers, "grow_charts", None)
+    started = crash_some_processes(monkeypatch, {0})
     with growers.PatientGrower(60.0, 12, threads=1, in_window=True) as grower:
         uv, chart = grower(*meshes)
     assert len(started) == 2
     assert all(process.poll() is not None for process in started)
     np.testing.assert_array_equal(uv, expected[0])
     np.testing.assert_array_equal(chart, expected[1])
+    assert not grower.crashed
+
+
+def test_an_object_that_crashes_xatlas_twice_is_cut_by_direction(
+    bowl: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other object of its batch has the charts that it has alone."""
+    vertices, faces, mesh = two_of(bowl)
+    expected = growers.grow_charts(vertices, faces, mesh)
+    by_direction = box_charts(vertices, faces[mesh == 0])
+    started = crash_some_processes(monkeypatch, {0, 1})
+    with growers.PatientGrower(60.0, 12, threads=1, in_window=True) as grower:
+        uv, chart = grower(vertices, faces, mesh)
+    assert grower.crashed == {0}
+    assert len(started) == 3
+    np.testing.assert_array_equal(uv[mesh == 0], by_direction[0])
+    np.testing.assert_array_equal(uv[mesh == 5], expected[0][mesh == 5])
+    assert not set(chart[mesh == 0]) & set(chart[mesh == 5])
 
 
 def test_canceled_while_a_process_works_nothing_is_left_of_it(monkeypatch: pytest.MonkeyPatch) -> None:

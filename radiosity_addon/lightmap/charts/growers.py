@@ -13,7 +13,7 @@ from ...base import Cancelled
 from ...numerics import thread_count
 from .box_charts import box_charts
 from .delayed_release import DelayedRelease
-from .xatlas_worker import XatlasProcess, run_xatlas
+from .xatlas_worker import XatlasCrashError, XatlasProcess, run_xatlas
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -35,9 +35,7 @@ def grow_charts(vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
     Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
     Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
-    atlas, uv, chart = run_xatlas(vertices, faces, mesh)
-    resting.keep(atlas)
-    return uv, chart
+    return run_xatlas(vertices, faces, mesh, resting.keep)
 
 
 class PatientGrower:
@@ -46,12 +44,14 @@ class PatientGrower:
     May be called from as many threads at once as it has processes. Leaving its context ends these.
 
     gave_up: The objects that took too long.
+    crashed: Those that ended xatlas' process twice.
     """
 
     def __init__(self, seconds: float, triangles: int = 0, threads: int = 1, in_window: bool = False) -> None:
         """Start no process before it is needed, and none for few triangles without a window."""
         processes = thread_count(threads) if in_window or triangles > WORTH_PROCESSES else 0
         self.gave_up: set[int] = set()
+        self.crashed: set[int] = set()
         self._seconds, self._lock, self._closed = seconds, threading.Lock(), False
         self._spent: dict[int, float] = {}
         self._processes = [XatlasProcess() for _ in range(processes)]
@@ -93,22 +93,41 @@ class PatientGrower:
         return uv, chart
 
     def _grown(self, vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
-        """Cut in a process, if there is one that works."""
-        if self._processes:
-            process = self._idle.get()
+        """Cut in a process; objects one by one after a crash, and by directions after two."""
+        if not self._processes:
+            return grow_charts(vertices, faces, mesh)
+        try:
+            return self._run(vertices, faces, mesh)
+        except XatlasCrashError:
+            pass
+        uv, chart = np.empty((len(faces), 3, 2)), np.empty(len(faces), dtype=np.int64)
+        count = 0
+        for number in np.unique(mesh).tolist():
+            rows = mesh == number
             try:
-                found = process.run(vertices, faces, mesh)
-                if found is None and not self._closed:
-                    # xatlas may have crashed, which hardly happens twice.
-                    process = self._another()
-                    found = process.run(vertices, faces, mesh)
-            finally:
-                self._idle.put(process)
-            if self._closed:
-                raise Cancelled
-            if found is not None:
-                return found
-        return grow_charts(vertices, faces, mesh)
+                uv[rows], own = self._run(vertices, faces[rows], mesh[rows])
+            except XatlasCrashError:
+                uv[rows], own = box_charts(vertices, faces[rows])
+                self.crashed.add(number)
+            chart[rows] = np.where(own >= 0, own + count, -1)
+            count = max(count, int(chart[rows].max()) + 1)
+        return uv, chart
+
+    def _run(self, vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int]:
+        """Cut in a process, or here if none starts; raises `XatlasCrashError`, with a new process ready."""
+        process = self._idle.get()
+        try:
+            found = process.run(vertices, faces, mesh)
+        except XatlasCrashError:
+            process = self._another()
+            if not self._closed:
+                raise
+            found = None
+        finally:
+            self._idle.put(process)
+        if self._closed:
+            raise Cancelled
+        return grow_charts(vertices, faces, mesh) if found is None else found
 
     def _another(self) -> XatlasProcess:
         process = XatlasProcess()

@@ -14,6 +14,7 @@ import os
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
@@ -38,23 +39,40 @@ TEXELS_PER_UNIT = 0.25
 """At which xatlas packs. Its packing is not used, and takes longer than cutting at the scale it chooses."""
 
 
-def run_xatlas(vertices: Float, faces: Int, mesh: Int) -> tuple[Any, Float, Int]:
+class XatlasCrashError(Exception):
+    """xatlas ended its process."""
+
+
+def run_xatlas(vertices: Float, faces: Int, mesh: Int, keep: Callable[[object], None]) -> tuple[Float, Int]:
     """Cut meshes into charts in this process.
+
+    Each mesh has an atlas of its own. Adding a second one may move the list of tasks in memory
+    while a thread of xatlas reads from it: on a busy machine, one in 2,000 small atlases crashed.
 
     vertices (v, 3): At a scale where triangles are about 1 in area, welded.
     faces (n, 3) int64: Those of one mesh use a range of vertices of their own.
     mesh (n,) int64: Ascending.
-    Returns to be kept a while: destroyed right after its work it may hang.
+    keep: Takes the atlases: destroyed right after its work one may hang.
     Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
     Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
+    uvs, charts, count = [], [], 0
+    for part in np.split(faces, np.flatnonzero(np.diff(mesh)) + 1):
+        low, high = int(part.min()), int(part.max()) + 1
+        atlas, uv, chart = _cut_mesh(vertices[low:high], part - low)
+        keep(atlas)
+        uvs.append(uv)
+        charts.append(np.where(chart >= 0, chart + count, -1))
+        count = max(count, int(charts[-1].max()) + 1)
+    return np.concatenate(uvs), np.concatenate(charts)
+
+
+def _cut_mesh(vertices: Float, faces: Int) -> tuple[object, Float, Int]:
+    """Return xatlas' atlas of a mesh, uv (n, 3, 2) and chart (n,), −1 where a face was left out."""
     import xatlas
 
     atlas = xatlas.Atlas()
-    parts = np.split(faces, np.flatnonzero(np.diff(mesh)) + 1)
-    for part in parts:
-        low, high = int(part.min()), int(part.max()) + 1
-        atlas.add_mesh(vertices[low:high].astype(np.float32), (part - low).astype(np.uint32))
+    atlas.add_mesh(vertices.astype(np.float32), faces.astype(np.uint32))
     # Its packing is not used: make it quick, and do not let it turn charts twice.
     packing = xatlas.PackOptions()
     packing.rotate_charts = False
@@ -62,18 +80,12 @@ def run_xatlas(vertices: Float, faces: Int, mesh: Int) -> tuple[Any, Float, Int]
     packing.max_chart_size = LONGEST_CHART
     packing.texels_per_unit = TEXELS_PER_UNIT
     atlas.generate(xatlas.ChartOptions(), packing)
+    _, indices, uv = atlas[0]
+    _, chart_of_vertex = atlas.get_mesh_vertex_assignment(0)
+    chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
+    chart = np.where(chart == np.iinfo(np.uint32).max, -1, chart)
     scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
-    uvs, charts, count = [], [], 0
-    for number in range(len(parts)):
-        _, indices, uv = atlas[number]
-        _, chart_of_vertex = atlas.get_mesh_vertex_assignment(number)
-        chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
-        left_out = chart == np.iinfo(np.uint32).max
-        chart = np.where(left_out, -1, chart - chart.min() + count)
-        count = max(count, int(chart.max()) + 1)
-        uvs.append(uv[indices].astype(np.float64) * scale)
-        charts.append(chart)
-    return atlas, np.concatenate(uvs), np.concatenate(charts)
+    return atlas, uv[indices].astype(np.float64) * scale, chart
 
 
 class XatlasProcess:
@@ -84,30 +96,37 @@ class XatlasProcess:
         self._closed, self._lock = False, threading.Lock()
 
     def run(self, vertices: Float, faces: Int, mesh: Int) -> tuple[Float, Int] | None:
-        """Cut meshes into charts; None if the process cannot be started, or ended.
+        """Cut meshes into charts; None if the process does not start.
 
-        Parameters and results are those of `run_xatlas`, to the last bit.
+        Parameters and results are those of `run_xatlas`, to the last bit. Raises `XatlasCrashError` if the
+        process ended, or was ended, while it worked.
         """
-        timer = None
+        timer, started = None, False
         try:
             with self._lock:
                 if self._closed:
                     return None
-                process = self._process = self._process or start_process()
+                first, process = self._process is None, self._process or start_process()
+                self._process = process
             timer = threading.Timer(TIMEOUT, process.kill)
             timer.daemon = True
             timer.start()
             assert process.stdin is not None
             assert process.stdout is not None
+            if first:
+                _read(process.stdout)
+            started = True
             _write(process.stdin, _packed(vertices, faces, mesh))
             uv, chart = _unpacked(_read(process.stdout), 2)
-        except (OSError, ValueError, EOFError):
+        except (OSError, ValueError, EOFError) as error:
             self.close()
+            if started:
+                raise XatlasCrashError from error
             return None
         finally:
             if timer is not None:
                 timer.cancel()
-        return (uv, chart) if len(chart) == len(faces) else None
+        return uv, chart
 
     def close(self) -> None:
         """End the process, whatever it is doing."""
@@ -163,20 +182,19 @@ def _unpacked(data: bytes, count: int) -> tuple[NDArray[Any], ...]:
 
 
 def _answer() -> None:
-    """Read meshes from standard input and write their charts to standard output, until the input ends."""
+    """Say that it works, then read meshes and write their charts, until the input ends."""
+    importlib.import_module("xatlas")
     resting = importlib.import_module("delayed_release").DelayedRelease()
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # other output must not be mixed with it
+    _write(answer, b"")
     while True:
         try:
-            meshes = _unpacked(_read(sys.stdin.buffer), 3)
+            vertices, faces, mesh = _unpacked(_read(sys.stdin.buffer), 3)
         except EOFError:
             # Without cleanup: destroying an atlas may hang.
             os._exit(0)
-        atlas, uv, chart = run_xatlas(*meshes)
-        _write(answer, _packed(uv, chart))
-        resting.keep(atlas)
-        del atlas, uv, chart
+        _write(answer, _packed(*run_xatlas(vertices, faces, mesh, resting.keep)))
 
 
 if __name__ == "__main__":

@@ -244,13 +244,14 @@ def _unwrapped(
     seconds = options.unwrap_seconds
     with PatientGrower(seconds, len(triangles), options.threads, progress.in_window) as grower:
         charts = unwrap(triangles, polygon, grower, progress, options.threads, owner, grower.close)
-    for number in sorted(grower.gave_up):
-        # Batches are numbered by object.
+    # Batches are numbered by object.
+    for number in sorted(grower.gave_up | grower.crashed):
         name = objects[number].name
+        what = "crashed xatlas" if number in grower.crashed else f"took more than {seconds:g} s to unwrap"
         warnings.append(
             BakeWarning(
                 name,
-                f"object '{name}' took more than {seconds:g} s to unwrap; the rest was cut by face "
+                f"object '{name}' {what}; the rest was cut by face "
                 "direction, which makes more seams: give it a UV layer Lightmap and keep UVs, or simplify it",
             )
         )
