@@ -8,7 +8,9 @@ import bpy
 
 from ...base import RadiosityError
 from ..operators.checks import figures, last_check, look
+from ..operators.panel_facts import faces_to_flip
 from ..operators.polls import Conditional, has_scene, no_bake_runs
+from .face_buttons import draw_face_buttons
 from .sections import Section
 from .wrapped_text import draw_text
 
@@ -90,6 +92,7 @@ class CheckSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw figures and findings."""
         draw_inspection(layout, last_check(context.scene), context, None)
+        draw_face_buttons(layout, faces_to_flip(context)[1], "bake or check again", context)
 
 
 def draw_inspection(layout: Any, found: Any, context: bpy.types.Context, width: float | None) -> None:
