@@ -322,16 +322,17 @@ def test_linked_meshes_and_overrides_are_refused(tmp_path: Path) -> None:
     refused("its mesh is a library override")
 
 
-def test_flipping_and_selecting_work_from_edit_mode() -> None:
+def test_selecting_shows_the_faces_in_edit_mode_from_where_nothing_is_flipped() -> None:
+    """Undo in Edit Mode would bring back the meshes that are edited alone."""
     boxes = two_boxes()
     bake()
-    bpy.context.view_layer.objects.active = boxes
-    bpy.ops.object.mode_set(mode="EDIT")
     assert bpy.ops.radiosity.select_turned_faces() == {"FINISHED"}
     assert [polygon.index for polygon in boxes.data.polygons if polygon.select] == list(range(6, 12))
     assert [obj.name for obj in bpy.context.view_layer.objects.selected] == ["Boxes"]
+    assert bpy.context.view_layer.objects.active == boxes
     bpy.ops.object.mode_set(mode="EDIT")
-    assert flip() == {"FINISHED"}
-    assert bpy.context.mode == "EDIT_MESH"
+    assert boxes.data.total_face_sel == 6
+    for operator in (bpy.ops.radiosity.select_turned_faces, bpy.ops.radiosity.flip_turned_faces):
+        assert not operator.poll()
     bpy.ops.object.mode_set(mode="OBJECT")
-    assert facing(boxes) == [1] * 12
+    assert facing(boxes) == [1] * 6 + [-1] * 6

@@ -133,9 +133,12 @@ def test_free_normals_are_reversed_along(domain: str) -> None:
         np.testing.assert_allclose([one[key] for key in one], [other[key] for key in one], atol=2e-3)
 
 
-def test_selecting_polygons_selects_what_belongs_to_them_alone() -> None:
+def test_selecting_polygons_selects_nothing_else() -> None:
     mesh = full_mesh()
+    assert all(edge.select for edge in mesh.edges)
+    digest = digest_of_mesh(mesh)
     select_polygons(mesh, SOME)
+    assert digest_of_mesh(mesh) == digest
     assert [polygon.index for polygon in mesh.polygons if polygon.select] == SOME
     vertices = {vertex for number in SOME for vertex in mesh.polygons[number].vertices}
     assert {vertex.index for vertex in mesh.vertices if vertex.select} == vertices

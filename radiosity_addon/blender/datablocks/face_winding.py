@@ -6,7 +6,8 @@ A polygon's front is where its corners run counter-clockwise.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import bmesh
 import bpy
@@ -30,15 +31,13 @@ def winding_digest(mesh: bpy.types.Mesh) -> str:
 
 def select_polygons(mesh: bpy.types.Mesh, polygons: Sequence[int]) -> None:
     """Select polygons of a mesh in Object Mode, with their edges and vertices, and nothing else of it."""
-    _, size = _sizes(mesh)
-    chosen = np.isin(np.arange(len(size)), polygons)
-    corners = np.repeat(chosen, size)
-    mesh.polygons.foreach_set("select", chosen)
-    for name, elements in (("vertex_index", mesh.vertices), ("edge_index", mesh.edges)):
-        number = np.empty(len(mesh.loops), dtype=np.int32)
-        mesh.loops.foreach_get(name, number)
-        elements.foreach_set("select", np.bincount(number, corners, len(elements)) > 0)
-    mesh.update()
+    chosen = set(polygons)
+    # By the mesh itself, to set edges crashes Blender 5.0 where a script made the mesh.
+    with _opened(mesh) as work:
+        work.select_mode = {"FACE"}
+        for face in work.faces:
+            face.select = face.index in chosen
+        work.select_flush_mode()
 
 
 def flip_polygons(mesh: bpy.types.Mesh, polygons: Sequence[int]) -> None:
@@ -52,20 +51,28 @@ def flip_polygons(mesh: bpy.types.Mesh, polygons: Sequence[int]) -> None:
     if mesh.has_custom_normals and not is_free:
         normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
         mesh.corner_normals.foreach_get("vector", normals.reshape(-1))
-    work = bmesh.new()
-    try:
-        work.from_mesh(mesh)
-        work.faces.ensure_lookup_table()
+    with _opened(mesh) as work:
         bmesh.ops.reverse_faces(work, faces=[work.faces[number] for number in polygons], flip_multires=True)
-        work.to_mesh(mesh)
-    finally:
-        work.free()
     if normals is not None:
         order, is_flipped = _corners(mesh, polygons)
         # All of them: they are stored relative to normals that change along with a neighbor's.
         mesh.normals_split_custom_set(np.where(is_flipped[:, None], -1.0, 1.0) * normals[order])
     elif is_free:
         _reverse_free_normals(mesh, polygons)
+        mesh.update()
+
+
+@contextmanager
+def _opened(mesh: bpy.types.Mesh) -> Iterator[bmesh.types.BMesh]:
+    """Yield a mesh for edits, which it takes over at the end."""
+    work = bmesh.new()
+    try:
+        work.from_mesh(mesh)
+        work.faces.ensure_lookup_table()
+        yield work
+        work.to_mesh(mesh)
+    finally:
+        work.free()
     mesh.update()
 
 

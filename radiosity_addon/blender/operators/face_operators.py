@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import bpy
 
 from ...base import RadiosityError
@@ -12,7 +9,7 @@ from ..datablocks.bake_record import is_made
 from ..session import facts, last_bake
 from ..session.turned_faces import TurnedFaces, runs_of
 from .checks import last_check
-from .polls import Conditional, has_scene, no_bake_runs
+from .polls import Conditional, has_scene, in_object_mode, no_bake_runs
 
 MOST_REPORTED = 3
 """So many refusals are reported one by one."""
@@ -31,7 +28,7 @@ class RADIOSITY_OT_flip_turned_faces(Conditional, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    conditions = (no_bake_runs, has_scene)
+    conditions = (no_bake_runs, has_scene, in_object_mode)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Flip what can be flipped, and say why the rest is not."""
@@ -39,15 +36,14 @@ class RADIOSITY_OT_flip_turned_faces(Conditional, bpy.types.Operator):
         from ..apply.face_flips import flip
 
         try:
-            with _object_mode(context):
-                for warning in carry_edits(context):
-                    self.report({"WARNING"}, warning.message)
-                found = _turned_faces(context.scene)
-                names = [faces.object for faces in found]
-                if self.only_selected:
-                    selected = {obj.name for obj in context.view_layer.objects.selected}
-                    names = [name for name in names if name in selected]
-                flipped = flip(context, found, names)
+            for warning in carry_edits(context):
+                self.report({"WARNING"}, warning.message)
+            found = _turned_faces(context.scene)
+            names = [faces.object for faces in found]
+            if self.only_selected:
+                selected = {obj.name for obj in context.view_layer.objects.selected}
+                names = [name for name in names if name in selected]
+            flipped = flip(context, found, names)
         except RadiosityError as error:
             self.report({"ERROR"}, " ".join(str(error).split()))
             return {"CANCELLED"}
@@ -76,12 +72,10 @@ class RADIOSITY_OT_select_turned_faces(Conditional, bpy.types.Operator):
     bl_label = "Select Turned Faces"
     bl_options = {"REGISTER", "UNDO"}
 
-    conditions = (no_bake_runs, has_scene)
+    conditions = (no_bake_runs, has_scene, in_object_mode)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Select them, and nothing else; Edit Mode shows the faces."""
-        if context.mode != "OBJECT" and bpy.ops.object.mode_set.poll():
-            bpy.ops.object.mode_set(mode="OBJECT")
         found = {faces.object: faces for faces in _turned_faces(context.scene)}
         shown = [obj for obj in context.view_layer.objects if obj.name in found and obj.visible_get()]
         for obj in context.view_layer.objects:
@@ -94,19 +88,6 @@ class RADIOSITY_OT_select_turned_faces(Conditional, bpy.types.Operator):
         for obj in shown:
             _select_faces(obj, found[obj.name])
         return {"FINISHED"}
-
-
-@contextmanager
-def _object_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Leave Edit Mode while the meshes that are in it are changed."""
-    editing = context.mode == "EDIT_MESH" and bpy.ops.object.mode_set.poll()
-    if editing:
-        bpy.ops.object.mode_set(mode="OBJECT")
-    try:
-        yield
-    finally:
-        if editing and bpy.ops.object.mode_set.poll():
-            bpy.ops.object.mode_set(mode="EDIT")
 
 
 def _turned_faces(scene: bpy.types.Scene) -> list[TurnedFaces]:
