@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 
 from .compare import say
-from .window import ROOT, cornell_window, drive
+from .window import ROOT, cornell_window
 
 IMAGES = ROOT / "docs" / "images"
 
@@ -14,7 +14,7 @@ PICTURES = ("panel", "presets", "check", "progress")
 
 def main() -> None:
     with cornell_window() as (installed, scene):
-        drive(installed, scene, "drive_working.py", ("1280", "800"))
+        installed.drive("drive_working.py", scene, "working")
         for name in PICTURES:
             shutil.copy(scene.with_name(f"working-{name}.png"), IMAGES / f"{name}.png")
             say(f"docs/images/{name}.png")
