@@ -1,4 +1,4 @@
-"""The buttons below warnings of faces that show their backs: *Flip Faces* and *Select*."""
+"""The buttons above warnings of faces that show their backs: *Flip Faces* and *Select*."""
 
 from __future__ import annotations
 

@@ -223,14 +223,14 @@ class WarningsSection(Section):
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
-        """Draw the first warnings."""
+        """Draw the first warnings, and what can be done about some."""
         last = last_bake.read(context.scene) or last_bake.LastBake()
+        draw_face_buttons(layout, faces_to_flip(context)[0], "bake again", context)
         for name, message in last.warnings[:SHOWN_WARNINGS]:
             draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
         if hidden > 0:
             layout.label(text=f"and {hidden} more, in the report", translate=False)
-        draw_face_buttons(layout, faces_to_flip(context)[0], "bake again", context)
 
 
 class ExportSection(Section):

@@ -91,8 +91,8 @@ class CheckSection(Section):
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw figures and findings."""
-        draw_inspection(layout, last_check(context.scene), context, None)
         draw_face_buttons(layout, faces_to_flip(context)[1], "bake or check again", context)
+        draw_inspection(layout, last_check(context.scene), context, None)
 
 
 def draw_inspection(layout: Any, found: Any, context: bpy.types.Context, width: float | None) -> None:

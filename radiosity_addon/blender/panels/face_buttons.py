@@ -1,4 +1,4 @@
-"""Below warnings of faces that show their backs: buttons to select and flip them, and what to do then."""
+"""Above warnings of faces that show their backs: buttons to select and flip them, and what to do then."""
 
 from __future__ import annotations
 
