@@ -7,13 +7,13 @@ import os
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
 from functools import partial
-from statistics import median
 from typing import Any
 
 from ..base import Progress
-from ..numerics import run_by
+from ..numerics import run_by, thread_count
 from .objects import ObjectError, Writer
 from .published import PublishedArrays
 from .spool import Spool
@@ -26,7 +26,7 @@ POLL = 0.02
 """Seconds between looks for results."""
 
 PATIENCE = 2.0
-"""Seconds, or …"""
+"""Seconds, and …"""
 
 TIMES = 3.0
 """… times what a task takes, after which a task that was claimed is done here: its worker may be gone."""
@@ -38,67 +38,93 @@ class FolderExecutor:
     def __init__(self, spool: Spool) -> None:
         self._spool = spool
         self._store = PublishedArrays(spool)
-        self._who = f"bake {socket.gethostname()} {os.getpid()}"
 
     def run(
-        self, work: Callable[[slice], Any], slices: list[slice], progress: Progress
+        self, work: Callable[[slice], Any], slices: list[slice], threads: int, progress: Progress
     ) -> Iterator[Any] | None:
         """See `numerics.Executor`."""
         if len(slices) < FEWEST or not isinstance(work, partial) or not is_kernel(work.func):
             return None
-        return self._results(work, slices, progress)
+        return self._results(work, slices, thread_count(threads), progress)
 
-    def _results(self, work: partial[Any], slices: list[slice], progress: Progress) -> Iterator[Any]:
-        writer = Writer(self._store)
+    def _results(
+        self, work: partial[Any], slices: list[slice], threads: int, progress: Progress
+    ) -> Iterator[Any]:
         bounds = [[piece.start, piece.stop] for piece in slices]
-        digest = self._spool.put_call(json.dumps({"kernel": writer.tree(work), "slices": bounds}))
-        count = task_count(len(slices))
-        taken: list[float] = []
+        tree = Writer(self._store).tree(work)
+        digest = self._spool.put_call(json.dumps({"kernel": tree, "slices": bounds}))
+        call = _SharedCall(self._spool, digest, work, bounds, threads)
         try:
-            for task in range(count):
-                found = self._result(digest, task, count, work, bounds, taken, progress)
-                yield from found
-                progress.at((task + 1) / count)
+            for task in range(call.count):
+                yield from call.result(task, progress)
+                progress.at((task + 1) / call.count)
         finally:
             self._spool.close_call()
+            call.close()
 
-    def _result(
-        self,
-        digest: str,
-        task: int,
-        count: int,
-        work: partial[Any],
-        bounds: list[list[int]],
-        taken: list[float],
-        progress: Progress,
-    ) -> list[Any]:
-        """Return what a task found: wait for it, doing other tasks meanwhile, and this one if nobody does."""
+
+class _SharedCall:
+    """A call whose tasks are done by workers, and here on some threads."""
+
+    def __init__(
+        self, spool: Spool, digest: str, work: partial[Any], bounds: list[list[int]], threads: int
+    ) -> None:
+        self.count = task_count(len(bounds))
+        self._spool, self._digest, self._work, self._bounds = spool, digest, work, bounds
+        self._threads, self._pool = threads, ThreadPoolExecutor(threads)
+        self._who = f"{socket.gethostname()} {os.getpid()}"
+        self._running: dict[Future[list[Any]], int] = {}
+        self._found: dict[int, list[Any]] = {}
+        self._longest = 0.0
+
+    def close(self) -> None:
+        """Wait for what is being done here."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def result(self, task: int, progress: Progress) -> list[Any]:
+        """Return what a task found: wait for it, doing others meanwhile, and this one if nobody does."""
         since = time.monotonic()
         while True:
-            stored = self._spool.result(digest, task) if task in self._spool.done(digest) else None
-            if stored is not None:
-                try:
-                    return values_of(*stored)
-                except ObjectError:
-                    pass  # damaged in a way that digests do not show: done again here
-            free = self._free(digest, task, count)
-            waited = time.monotonic() - since
-            if free is None and waited > max(PATIENCE, TIMES * median(taken or [0.0])):
-                free = task
-            if free is None:
-                progress.at(task / count)
+            found = self._found.pop(task, None) or self._stored(task)
+            if found is not None:
+                return found
+            self._do_free_tasks(task)
+            here = task in self._running.values()
+            if not here and time.monotonic() - since > max(PATIENCE, TIMES * self._longest):
+                self._do(task)
+            progress.at(task / self.count)
+            if not self._running:
                 time.sleep(POLL)
                 continue
-            started = time.monotonic()
-            with run_by(None):
-                run_task(self._spool, digest, free, work, bounds)
-            taken.append(time.monotonic() - started)
+            for future in wait(self._running, POLL, FIRST_COMPLETED).done:
+                self._found[self._running.pop(future)] = future.result()
 
-    def _free(self, digest: str, first: int, count: int) -> int | None:
-        """Claim the first task from `first` on that nobody has claimed."""
-        taken = self._spool.claimed(digest) | self._spool.done(digest)
-        free = (each for each in range(first, count) if each not in taken)
-        return next((each for each in free if self._spool.claim(digest, each, self._who)), None)
+    def _stored(self, task: int) -> list[Any] | None:
+        """Return what a task found, if that is in the spool, and not damaged."""
+        stored = self._spool.result(self._digest, task)
+        with suppress(ObjectError):
+            return None if stored is None else values_of(*stored)
+        return None
+
+    def _do_free_tasks(self, first: int) -> None:
+        """Do tasks from `first` on that nobody has claimed, one on each thread."""
+        if len(self._running) >= self._threads:
+            return
+        taken = self._spool.claimed(self._digest) | self._spool.done(self._digest)
+        for task in range(first, self.count):
+            if len(self._running) >= self._threads:
+                return
+            if task not in taken and self._spool.claim(self._digest, task, self._who):
+                self._do(task)
+
+    def _do(self, task: int) -> None:
+        self._running[self._pool.submit(self._timed, task)] = task
+
+    def _timed(self, task: int) -> list[Any]:
+        started = time.monotonic()
+        found = run_task(self._spool, self._digest, task, self._work, self._bounds)
+        self._longest = max(self._longest, time.monotonic() - started)
+        return found
 
 
 @contextmanager

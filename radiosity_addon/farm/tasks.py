@@ -94,8 +94,8 @@ def task_count(slices: int) -> int:
     return -(-slices // slices_of_task(slices))
 
 
-def run_task(spool: Spool, digest: str, task: int, work: partial[Any], bounds: list[list[int]]) -> None:
-    """Run a kernel for the slices of a task, and write what they found."""
+def run_task(spool: Spool, digest: str, task: int, work: partial[Any], bounds: list[list[int]]) -> list[Any]:
+    """Run a kernel for the slices of a task, write what they found, and return it."""
     step = slices_of_task(len(bounds))
     found = [work(slice(*pair)) for pair in bounds[task * step : (task + 1) * step]]
     store = _ResultStore()
@@ -103,6 +103,7 @@ def run_task(spool: Spool, digest: str, task: int, work: partial[Any], bounds: l
     # Of truth values and numbers; a scalar's array has no axis.
     arrays = [np.ascontiguousarray(array) for array in store.arrays]
     spool.put_result(digest, task, {"found": tree, "objects": store.objects}, arrays)
+    return found
 
 
 def values_of(description: Any, arrays: list[Any]) -> list[Any]:

@@ -33,7 +33,7 @@ class Executor(Protocol):
     """Runs kernels elsewhere."""
 
     def run(
-        self, work: Callable[[slice], Any], slices: list[slice], progress: Progress
+        self, work: Callable[[slice], Any], slices: list[slice], threads: int, progress: Progress
     ) -> Iterator[Any] | None:
         """Return what a kernel finds for each slice, in order; None if it is to be run here."""
 
@@ -75,7 +75,7 @@ def fill_chunks(
     into: Arrays that take what `work` returns, each one of its results.
     at (rows,) int: In which of their rows; None for the same ones.
     """
-    if (found := _elsewhere(work, _slices(rows, chunk), progress)) is not None:
+    if (found := _elsewhere(work, _slices(rows, chunk), threads, progress)) is not None:
         for piece, values in found:
             _store(values, into, at, piece)
         return
@@ -120,7 +120,7 @@ def map_chunks(
     abort: Makes the slices in hand end soon. With it, cancelation is noticed while they are worked on.
     """
     slices = _slices(rows, chunk)
-    if (found := _elsewhere(work, slices, progress)) is not None:
+    if (found := _elsewhere(work, slices, threads, progress)) is not None:
         yield from found
         return
     workers = min(thread_count(threads), len(slices))
@@ -153,11 +153,11 @@ def _slices(rows: int, chunk: int) -> list[slice]:
 
 
 def _elsewhere(
-    work: Callable[[slice], T], slices: list[slice], progress: Progress
+    work: Callable[[slice], T], slices: list[slice], threads: int, progress: Progress
 ) -> Iterator[tuple[slice, T]] | None:
     """Return each slice with what the executor finds for it; None if the kernel is to be run here."""
     executor = _executor.get()
-    found = None if executor is None else executor.run(work, slices, progress)
+    found = None if executor is None else executor.run(work, slices, threads, progress)
     return None if found is None else zip(slices, found, strict=True)
 
 

@@ -16,6 +16,7 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.base import BakeError
+from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.farm import Spool, shared_bake
 from radiosity_addon.farm.tasks import KERNELS
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -185,6 +186,31 @@ def test_a_full_disk_is_one_line_and_what_is_done_stays(
             baked_bytes(ROOMS[name](), tmp_path)
     assert list(tmp_path.glob("calls/*/*.result"))
     assert baked_bytes(ROOMS[name](), tmp_path) == alone
+
+
+def test_the_command_line_shares_a_bake(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["bake", "--resolution", "64", "--quality", "sketch", "--no-preview", "--quiet"]
+    assert main([*words, "--output", str(tmp_path / "alone")]) == 0
+    assert main([*words, "--output", str(tmp_path / "shared"), "--spool", str(tmp_path / "spool")]) == 0
+    alone, shared = ((tmp_path / name / "lightmap.exr").read_bytes() for name in ("alone", "shared"))
+    assert alone == shared
+    assert not capsys.readouterr().err
+
+
+def test_a_folder_of_other_things_is_refused_before_the_bake(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    assert main(["bake", "--output", str(tmp_path / "out"), "--spool", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.strip().endswith("is not empty and no spool: give an empty folder")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["thesis.txt"]
+
+
+def test_relighting_has_nothing_to_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["bake", "--relight", "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
+    assert main(words) == 2
+    assert "leave --spool out" in capsys.readouterr().err
+    assert not (tmp_path / "spool").exists()
 
 
 def test_a_worker_runs_nothing_but_kernels(tmp_path: Path) -> None:
