@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import socket
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -72,7 +70,6 @@ class _SharedCall:
         self.count = task_count(len(bounds))
         self._spool, self._digest, self._work, self._bounds = spool, digest, work, bounds
         self._threads, self._pool = threads, ThreadPoolExecutor(threads)
-        self._who = f"{socket.gethostname()} {os.getpid()}"
         self._running: dict[Future[list[Any]], int] = {}
         self._found: dict[int, list[Any]] = {}
         self._longest = 0.0
@@ -93,6 +90,7 @@ class _SharedCall:
             if not here and time.monotonic() - since > max(PATIENCE, TIMES * self._longest):
                 self._do(task)
             progress.at(task / self.count)
+            self._spool.give_sign()
             if not self._running:
                 time.sleep(POLL)
                 continue
@@ -114,7 +112,7 @@ class _SharedCall:
         for task in range(first, self.count):
             if len(self._running) >= self._threads:
                 return
-            if task not in taken and self._spool.claim(self._digest, task, self._who):
+            if task not in taken and self._spool.claim(self._digest, task):
                 self._do(task)
 
     def _do(self, task: int) -> None:

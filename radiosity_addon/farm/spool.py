@@ -7,6 +7,7 @@
     calls/DIGEST/N.claim     some process is at task N: a few slices
     calls/DIGEST/N.result    what the task found
     open                     the digest of the call that waits for its tasks
+    baking                   which process bakes
     over                     the bake has ended
 
 Everything is written aside and renamed, and checked by its digest when it is read: what is not whole is
@@ -18,8 +19,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 import re
-import shutil
+import socket
+import sys
+import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,8 +43,15 @@ Array = npt.NDArray[Any]
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
 
+SILENCE = 60.0
+"""Seconds after which a bake of another machine that gave no sign is gone."""
+
 _DIGEST = re.compile(r"[0-9a-f]{40}")
 _FOLDERS = ("arrays", "objects", "calls", "aside")
+_OURS = re.compile(
+    r"(arrays/[0-9a-f]{40}\.npy|objects/[0-9a-f]{40}\.json|calls/[0-9a-f]{40}/(call\.json|\d+\.(claim|result))"
+    r"|aside/[0-9a-f]{32})"
+)
 
 
 class Spool:
@@ -57,7 +68,7 @@ class Spool:
     def to_bake(cls, path: Path) -> Spool:
         """Return a spool to bake with: a new one in an empty folder, or one of this program.
 
-        Raises BakeError if the folder holds other things, or cannot be written to.
+        Raises BakeError if the folder holds other things, another bake uses it, or it cannot be written to.
         """
         spool = cls(path)
         with _explained(spool.path):
@@ -68,11 +79,38 @@ class Spool:
                     raise BakeError(f"'{spool.path}' is not empty and no spool: give an empty folder")
                 spool._write(record, json.dumps({"kind": KIND, "program": identity()}).encode())
             spool.check()
+            spool._refuse_second_bake()
             for name in _FOLDERS:
                 (spool.path / name).mkdir(exist_ok=True)
             with contextlib.suppress(FileNotFoundError):
                 (spool.path / "over").unlink()
+            spool._write(spool.path / "baking", this_process().encode())
         return spool
+
+    def _refuse_second_bake(self) -> None:
+        sign = self.path / "baking"
+        try:
+            host, number = sign.read_text().split()
+            if [host, number] == this_process().split():
+                return
+            alive = is_alive(int(number)) if host == socket.gethostname() else self._silence() < SILENCE
+        except (OSError, ValueError):
+            return
+        if alive:
+            raise BakeError(
+                f"spool '{self.path}' is used by process {number} on {host}: give each bake its own "
+                f"(if that is no bake, remove '{sign}')"
+            )
+
+    def _silence(self) -> float:
+        """Return for how long the bake has given no sign [s]."""
+        return time.time() - (self.path / "baking").stat().st_mtime
+
+    def give_sign(self) -> None:
+        """Show now and then that the bake goes on."""
+        with contextlib.suppress(OSError):
+            if self._silence() > SILENCE / 10:
+                (self.path / "baking").touch()
 
     @classmethod
     def to_work(cls, path: Path) -> Spool:
@@ -186,11 +224,11 @@ class Spool:
         with contextlib.suppress(OSError):
             (self.path / "open").unlink()
 
-    def claim(self, digest: str, task: int, who: str) -> bool:
+    def claim(self, digest: str, task: int) -> bool:
         """Return whether a task was free, and is now claimed."""
         try:
             with (self._at("calls", digest) / f"{task}.claim").open("x") as file:
-                file.write(who)
+                file.write(this_process())
         except FileExistsError:
             return False
         except OSError as error:
@@ -236,8 +274,18 @@ class Spool:
         """Tell all workers that the bake has ended, and remove what it left."""
         self._write(self.path / "over", b"")
         self.close_call()
+        with contextlib.suppress(OSError):
+            (self.path / "baking").unlink()
         for name in _FOLDERS:
-            shutil.rmtree(self.path / name, ignore_errors=True)
+            # Deepest first; what others put there stays, and the folders around it.
+            for path in sorted((self.path / name).rglob("*"), reverse=True):
+                with contextlib.suppress(OSError):
+                    if path.is_dir():
+                        path.rmdir()
+                    elif _OURS.fullmatch(path.relative_to(self.path).as_posix()):
+                        path.unlink()
+            with contextlib.suppress(OSError):
+                (self.path / name).rmdir()
 
     def is_over(self) -> bool:
         """Return whether the bake has ended."""
@@ -271,6 +319,24 @@ class Spool:
     def _put(self, aside: Path, path: Path) -> None:
         with _explained(self.path):
             aside.replace(path)
+
+
+def this_process() -> str:
+    """Return this machine's name and the number of this process."""
+    return f"{socket.gethostname()} {os.getpid()}"
+
+
+def is_alive(number: int) -> bool:
+    """Return whether a process of this machine runs."""
+    if sys.platform == "win32":
+        return False  # to send signal 0 there would end it
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        pass  # somebody else's
+    return True
 
 
 def array_digest(array: Array) -> str:

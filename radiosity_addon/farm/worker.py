@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -24,7 +22,6 @@ def work(spool: Spool, idle: float, say: Callable[[str], None] = lambda _: None)
     say: Is told of calls that cannot be read, which the bake does itself.
     Raises BakeError if the spool cannot be written to.
     """
-    who = f"{socket.gethostname()} {os.getpid()}"
     count, pause, since = 0, SHORTEST, time.monotonic()
     known: Recent[Any] = Recent()
     read, kernel, bounds = "", None, list[list[int]]()
@@ -40,7 +37,7 @@ def work(spool: Spool, idle: float, say: Callable[[str], None] = lambda _: None)
                 if not spool.is_over() and spool.open_call() == digest:
                     say(f"call {digest} is left to others: {error}")
                 read, kernel, bounds = digest, None, []
-            task = _free_task(spool, digest, task_count(len(bounds)), who)
+            task = _free_task(spool, digest, task_count(len(bounds)))
         if task is None or digest is None or kernel is None:
             time.sleep(pause)
             pause = min(2 * pause, LONGEST)
@@ -55,12 +52,12 @@ def work(spool: Spool, idle: float, say: Callable[[str], None] = lambda _: None)
     return count
 
 
-def _free_task(spool: Spool, digest: str, count: int, who: str) -> int | None:
+def _free_task(spool: Spool, digest: str, count: int) -> int | None:
     """Claim a task that nobody has claimed; None if there is none."""
     taken = spool.claimed(digest) | spool.done(digest)
     for task in range(count):
         try:
-            if task not in taken and spool.claim(digest, task, who):
+            if task not in taken and spool.claim(digest, task):
                 return task
         except BakeError:
             return None  # the call, or the bake, has ended

@@ -241,8 +241,8 @@ def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
         f'{{"kernel": {{"partial": [{{"function": "{name}"}}, 1, 2]}}, "slices": [[0, 1], [1, 2], [2, 3]]}}'
     )
     digest = spool.put_call(call)
-    spool.claim(digest, 0, "me")
-    spool.claim(digest, 1, "me")
+    spool.claim(digest, 0)
+    spool.claim(digest, 1)
     spool.put_result(digest, 1, None, [])
     assert f"{name}: 1 of 3 tasks done, 1 begun" in status()
     spool.end()
