@@ -58,11 +58,11 @@ def alone(name: str) -> str:
 
 @pytest.fixture
 def workers(tmp_path: Path) -> Iterator[Callable[[], subprocess.Popen[str]]]:
-    """Starts workers of `tmp_path / "spool"`, which exists from then on."""
+    """Starts workers of `tmp_path / "spool"`, as soon as it exists."""
     with ExitStack() as stack:
 
         def start() -> subprocess.Popen[str]:
-            Spool.to_bake(tmp_path / "spool")
+            until((tmp_path / "spool" / "spool.json").exists)
             words = [sys.executable, "-m", "radiosity_addon.farm", "worker", str(tmp_path / "spool")]
             worker = subprocess.Popen(
                 [*words, "--idle", "60"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -91,6 +91,7 @@ def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
 def test_any_number_of_workers_gives_the_same_bytes(
     count: int, name: str, alone: str, tmp_path: Path, workers: Callable[[], subprocess.Popen[str]]
 ) -> None:
+    Spool.to_bake(tmp_path / "spool")
     helping = [workers() for _ in range(count)]
     assert baked_bytes(ROOMS[name](), tmp_path / "spool") == alone
     done = [worker.communicate(timeout=60) for worker in helping]
@@ -108,8 +109,8 @@ def test_any_number_of_workers_gives_the_same_bytes(
 def test_a_worker_that_is_killed_costs_its_task_alone(
     kernel: str, name: str, alone: str, tmp_path: Path, workers: Callable[[], subprocess.Popen[str]]
 ) -> None:
-    worker = workers()
     baking = start_bake(tmp_path / "spool", name)
+    worker = workers()
 
     def is_at_it() -> bool:
         assert baking.poll() is None
