@@ -9,14 +9,19 @@ from .window import ROOT, cornell_window
 
 IMAGES = ROOT / "docs" / "images"
 
-PICTURES = ("panel", "presets", "check", "progress")
+PICTURES = {
+    **{f"working-{name}": name for name in ("panel", "presets", "check", "progress")},
+    "faces-buttons": "flip-faces",
+}
+"""What windows are photographed as, and what the pictures are called in the guide."""
 
 
 def main() -> None:
     with cornell_window() as (installed, scene):
-        installed.drive("drive_working.py", scene, "working")
-        for name in PICTURES:
-            shutil.copy(scene.with_name(f"working-{name}.png"), IMAGES / f"{name}.png")
+        for session in ("working", "faces"):
+            installed.drive(f"drive_{session}.py", scene, session)
+        for taken, name in PICTURES.items():
+            shutil.copy(scene.with_name(f"{taken}.png"), IMAGES / f"{name}.png")
             say(f"docs/images/{name}.png")
 
 

@@ -222,7 +222,7 @@ def test_a_mesh_that_another_object_shows_from_its_front_is_refused() -> None:
     first = box("First")
     same_mesh("Hidden", first, 4).hide_render = True
     bake()
-    refused("'Hidden' shares its mesh and is not turned")
+    refused("'Hidden' shares its mesh and was not found turned")
     assert facing(first) == [-1] * 6
 
 

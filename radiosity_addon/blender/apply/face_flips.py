@@ -163,8 +163,8 @@ def _refusal(name: str, sharing: Sequence[bpy.types.Object], found: dict[str, Tu
         return f"object '{name}': its mesh is a library override: flip the faces in its library"
     if other is not None:
         return (
-            f"object '{name}': '{other.name}' shares its mesh and is not turned: give it a mesh of its own "
-            "(Object → Relations → Make Single User)"
+            f"object '{name}': '{other.name}' shares its mesh and was not found turned: give it a mesh of "
+            "its own (Object → Relations → Make Single User)"
         )
     if any(found[user.name].is_right_elsewhere for user in sharing):
         return (

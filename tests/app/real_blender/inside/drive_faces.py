@@ -53,6 +53,10 @@ def script():
     yield from events.open_sidebar("Radiosity")
     call(bpy.ops.radiosity.bake)
     yield from look("baked")
+    sidebar = events.region("UI")
+    events.screenshot(
+        events.ANSWER.with_name("faces-buttons.png"), (sidebar.x - 10, 290, sidebar.width + 20, 300)
+    )
     before = dump_file()
     call(bpy.ops.radiosity.flip_turned_faces)
     yield from look("flipped")
