@@ -90,7 +90,6 @@ class _SharedCall:
             if not here and time.monotonic() - since > max(PATIENCE, TIMES * self._longest):
                 self._do(task)
             progress.at(task / self.count)
-            self._spool.give_sign()
             if not self._running:
                 time.sleep(POLL)
                 continue
@@ -131,6 +130,9 @@ def shared_bake(spool: Spool | None) -> Iterator[None]:
     if spool is None:
         yield
         return
-    with run_by(FolderExecutor(spool)):
-        yield
-    spool.end()
+    try:
+        with run_by(FolderExecutor(spool)), spool.giving_signs():
+            yield
+        spool.end()
+    finally:
+        spool.leave()

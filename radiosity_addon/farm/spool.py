@@ -27,6 +27,7 @@ import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ _DIGEST = re.compile(r"[0-9a-f]{40}")
 _FOLDERS = ("arrays", "objects", "calls", "aside")
 _OURS = re.compile(
     r"(arrays/[0-9a-f]{40}\.npy|objects/[0-9a-f]{40}\.json|calls/[0-9a-f]{40}/(call\.json|\d+\.(claim|result))"
-    r"|aside/[0-9a-f]{32})"
+    r"|aside/[0-9a-f]{32}|\.[0-9a-f]{32})"
 )
 
 
@@ -75,7 +76,8 @@ class Spool:
             spool.path.mkdir(parents=True, exist_ok=True)
             record = spool.path / "spool.json"
             if not record.exists():
-                if any(spool.path.iterdir()):
+                # A bake that was killed at its start may have left what it was writing.
+                if not all(_OURS.fullmatch(path.name) for path in spool.path.iterdir()):
                     raise BakeError(f"'{spool.path}' is not empty and no spool: give an empty folder")
                 spool._write(record, json.dumps({"kind": KIND, "program": identity()}).encode())
             spool.check()
@@ -94,7 +96,7 @@ class Spool:
             if [host, number] == this_process().split():
                 return
             alive = is_alive(int(number)) if host == socket.gethostname() else self._silence() < SILENCE
-        except (OSError, ValueError):
+        except (OSError, ValueError, OverflowError):
             return
         if alive:
             raise BakeError(
@@ -106,11 +108,23 @@ class Spool:
         """Return for how long the bake has given no sign [s]."""
         return time.time() - (self.path / "baking").stat().st_mtime
 
-    def give_sign(self) -> None:
-        """Show now and then that the bake goes on."""
-        with contextlib.suppress(OSError):
-            if self._silence() > SILENCE / 10:
-                (self.path / "baking").touch()
+    @contextlib.contextmanager
+    def giving_signs(self) -> Iterator[None]:
+        """Show other machines that the bake goes on, also through stages that are not shared."""
+        over = Event()
+
+        def give_signs() -> None:
+            while not over.wait(SILENCE / 10):
+                with contextlib.suppress(OSError):
+                    os.utime(self.path / "baking")
+
+        giver = Thread(target=give_signs, daemon=True)
+        giver.start()
+        try:
+            yield
+        finally:
+            over.set()
+            giver.join()
 
     @classmethod
     def to_work(cls, path: Path) -> Spool:
@@ -121,12 +135,18 @@ class Spool:
 
     def check(self) -> None:
         """Refuse what is no spool, or one of another program: its bytes would differ."""
+        path = self.path / "spool.json"
         try:
-            record = json.loads((self.path / "spool.json").read_bytes())
+            record = json.loads(path.read_bytes())
         except (OSError, ValueError, RecursionError):
             record = None
         if not isinstance(record, dict) or record.get("kind") != KIND:
+            if path.exists():
+                raise BakeError(f"'{path}' is damaged: give the bake an empty folder")
             raise BakeError(f"'{self.path}' is no spool; start the bake first, with --spool")
+        for name in _FOLDERS:
+            if (self.path / name).is_symlink():
+                raise BakeError(f"'{self.path / name}' is a link out of the spool: remove it")
         theirs, ours = record.get("program"), identity()
         if not isinstance(theirs, dict) or theirs != ours:
             theirs = theirs if isinstance(theirs, dict) else {}
@@ -142,13 +162,11 @@ class Spool:
 
     def put_object(self, digest: str, text: str) -> None:
         """See `Store`."""
-        path = self._at("objects", digest, ".json")
-        if not path.exists() or path.read_bytes() != text.encode():
-            self._write(path, text.encode())
+        self._keep(self._at("objects", digest, ".json"), text.encode())
 
     def object(self, digest: str) -> str:
         """See `Store`."""
-        text = self._read(self._at("objects", digest, ".json")).decode()
+        text = self._read(self._at("objects", digest, ".json")).decode(errors="replace")
         if digest_of(text) != digest:
             raise ObjectError(f"object {digest} is damaged")
         return text
@@ -159,10 +177,8 @@ class Spool:
         digest = array_digest(array)
         path = self._at("arrays", digest, ".npy")
         if not path.exists() or not self._is_whole(digest):
-            aside = self._aside()
-            with _explained(self.path), aside.open("wb") as file:
+            with self._replacing(path) as aside, aside.open("wb") as file:
                 np.save(file, array, allow_pickle=False)
-            self._put(aside, path)
         return digest
 
     def _is_whole(self, digest: str) -> bool:
@@ -195,9 +211,10 @@ class Spool:
         digest = digest_of(text)
         folder = self._at("calls", digest)
         with _explained(self.path):
+            if folder.is_symlink():
+                folder.unlink()
             folder.mkdir(exist_ok=True)
-            if not (folder / "call.json").exists():
-                self._write(folder / "call.json", text.encode())
+            self._keep(folder / "call.json", text.encode())
             # Whoever made claims in an earlier run may be gone.
             for claim in folder.glob("*.claim"):
                 with contextlib.suppress(OSError):
@@ -213,11 +230,15 @@ class Spool:
         return None
 
     def call(self, digest: str) -> Any:
-        """Return a call. Raises ObjectError if it is damaged."""
-        text = self._read(self._at("calls", digest) / "call.json").decode()
-        if digest_of(text) != digest:
+        """Return a call. Raises ObjectError if it is damaged, or a link out of the spool."""
+        folder = self._at("calls", digest)
+        text = self._read(folder / "call.json").decode(errors="replace")
+        if folder.is_symlink() or digest_of(text) != digest:
             raise ObjectError(f"call {digest} is damaged")
-        return json.loads(text)
+        try:
+            return json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise ObjectError(f"call {digest}: {error}") from error
 
     def close_call(self) -> None:
         """Show no call as waiting."""
@@ -251,10 +272,8 @@ class Spool:
 
     def put_result(self, digest: str, task: int, tree: Any, arrays: list[Array]) -> None:
         """Write what a task found."""
-        aside = self._aside()
-        with _explained(self.path):
+        with self._replacing(self._at("calls", digest) / f"{task}.result") as aside:
             write_arrays(aside, MAGIC, FORMAT, tree, arrays)
-        self._put(aside, self._at("calls", digest) / f"{task}.result")
 
     def result(self, digest: str, task: int) -> tuple[Any, list[Array]] | None:
         """Return what a task found; None, with the file removed, if it is damaged."""
@@ -274,18 +293,24 @@ class Spool:
         """Tell all workers that the bake has ended, and remove what it left."""
         self._write(self.path / "over", b"")
         self.close_call()
-        with contextlib.suppress(OSError):
-            (self.path / "baking").unlink()
-        for name in _FOLDERS:
-            # Deepest first; what others put there stays, and the folders around it.
-            for path in sorted((self.path / name).rglob("*"), reverse=True):
-                with contextlib.suppress(OSError):
-                    if path.is_dir():
-                        path.rmdir()
-                    elif _OURS.fullmatch(path.relative_to(self.path).as_posix()):
-                        path.unlink()
+        self.leave()
+        left = [path for path in self.path.glob(".*") if path.is_file()]
+        for folder in (self.path / name for name in _FOLDERS):
+            if not folder.is_symlink():
+                left += [folder, *folder.rglob("*")]
+        # Deepest first; what others put there stays, and the folders around it.
+        for path in sorted(left, reverse=True):
             with contextlib.suppress(OSError):
-                (self.path / name).rmdir()
+                if path.is_dir():
+                    path.rmdir()
+                elif _OURS.fullmatch(path.relative_to(self.path).as_posix()):
+                    path.unlink()
+
+    def leave(self) -> None:
+        """Take the sign away that a bake goes on here: another may go on with it at once."""
+        with contextlib.suppress(OSError):
+            if (self.path / "baking").read_text() == this_process():
+                (self.path / "baking").unlink()
 
     def is_over(self) -> bool:
         """Return whether the bake has ended."""
@@ -304,21 +329,30 @@ class Spool:
         except OSError as error:
             raise ObjectError(f"'{path}' cannot be read: {error.strerror}") from error
 
-    def _aside(self) -> Path:
-        folder = self.path / "aside"
-        with _explained(self.path):
-            folder.mkdir(exist_ok=True)
-        return folder / uuid.uuid4().hex
+    def _keep(self, path: Path, content: bytes) -> None:
+        """Write a file, if it is not there or damaged."""
+        with contextlib.suppress(OSError):
+            if path.read_bytes() == content:
+                return
+        self._write(path, content)
 
     def _write(self, path: Path, content: bytes) -> None:
-        aside = self._aside() if path.parent != self.path else path.with_name(f".{uuid.uuid4().hex}")
-        with _explained(self.path), aside.open("wb") as file:
-            file.write(content)
-        self._put(aside, path)
+        with self._replacing(path) as aside:
+            aside.write_bytes(content)
 
-    def _put(self, aside: Path, path: Path) -> None:
+    @contextlib.contextmanager
+    def _replacing(self, path: Path) -> Iterator[Path]:
+        """Yield where to write a file that is then put in its place, or removed if it cannot be written."""
+        name = uuid.uuid4().hex
+        aside = path.with_name(f".{name}") if path.parent == self.path else self.path / "aside" / name
         with _explained(self.path):
-            aside.replace(path)
+            try:
+                yield aside
+                aside.replace(path)
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    aside.unlink()
+                raise
 
 
 def this_process() -> str:

@@ -5,11 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-import os
-import socket
-import subprocess
-import sys
-import time
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -18,10 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from radiosity_addon.base import BakeError
-from radiosity_addon.farm.identity import identity
 from radiosity_addon.farm.objects import ObjectError, Reader, Writer, named
-from radiosity_addon.farm.spool import Spool, array_digest, this_process
+from radiosity_addon.farm.spool import Spool, array_digest
 from radiosity_addon.farm.tasks import KERNELS, is_kernel
 from radiosity_addon.lights import PointLight
 from radiosity_addon.numerics import Scratch, points_at, thread_count
@@ -237,52 +230,3 @@ def test_an_array_that_claims_to_be_larger_than_its_file_is_refused(spool: Spool
 def test_digests_tell_types_and_shapes_apart() -> None:
     zeros = [np.zeros(6), np.zeros((2, 3)), np.zeros((3, 2)), np.zeros(6, np.int64), np.zeros(12, np.float32)]
     assert len({array_digest(array) for array in zeros}) == len(zeros)
-
-
-def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.txt").write_text("mine")
-    with pytest.raises(BakeError, match="is not empty and no spool"):
-        Spool.to_bake(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
-    with pytest.raises(BakeError, match="is no spool"):
-        Spool.to_work(tmp_path)
-
-
-@pytest.mark.parametrize("name", sorted(identity()))
-def test_another_program_is_refused_by_what_differs(spool: Spool, name: str) -> None:
-    record = json.loads((spool.path / "spool.json").read_text())
-    record["program"][name] = "other"
-    (spool.path / "spool.json").write_text(json.dumps(record))
-    for make in (Spool.to_work, Spool.to_bake):
-        with pytest.raises(BakeError, match=f"of another {name}"):
-            make(spool.path)
-
-
-def test_a_spool_belongs_to_one_bake(spool: Spool) -> None:
-    sign = spool.path / "baking"
-    assert sign.read_text() == this_process()
-    host = socket.gethostname()
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
-        sign.write_text(f"{host} {other.pid}")
-        with pytest.raises(BakeError, match=f"is used by process {other.pid} on {host}"):
-            Spool.to_bake(spool.path)
-    # Gone now.
-    Spool.to_bake(spool.path)
-    sign.write_text("elsewhere 1")
-    with pytest.raises(BakeError, match="is used by process 1 on elsewhere"):
-        Spool.to_bake(spool.path)
-    os.utime(sign, (time.time() - 100,) * 2)
-    Spool.to_bake(spool.path)
-    assert sign.read_text() == this_process()
-
-
-def test_what_others_put_into_a_spool_stays(spool: Spool) -> None:
-    digest = spool.put_call("{}")
-    spool.put_array(np.arange(5000.0))
-    names = ["mine.txt", "arrays/mine.npy", "calls/mine/call.json", f"calls/{digest}/notes.txt"]
-    for name in names:
-        (spool.path / name).parent.mkdir(exist_ok=True)
-        (spool.path / name).write_text("mine")
-    spool.end()
-    left = [path.relative_to(spool.path).as_posix() for path in spool.path.rglob("*") if path.is_file()]
-    assert sorted(left) == sorted([*names, "over", "spool.json"])
