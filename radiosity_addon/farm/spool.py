@@ -391,6 +391,7 @@ def _explained(path: Path) -> Iterator[None]:
 
 
 def _full(path: Path, error: OSError) -> BakeError:
+    why = error.strerror or "its disk may be full"  # NumPy tells no more
     return BakeError(
-        f"cannot write to spool '{path}': {error.strerror}; see to it and start again: what is done is kept"
+        f"cannot write to spool '{path}': {why}; see to it and start again: what is done is kept"
     )

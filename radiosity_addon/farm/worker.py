@@ -53,12 +53,17 @@ def work(spool: Spool, idle: float, say: Callable[[str], None] = lambda _: None)
 
 
 def _free_task(spool: Spool, digest: str, count: int) -> int | None:
-    """Claim a task that nobody has claimed; None if there is none."""
+    """Claim a task that nobody has claimed; None if there is none.
+
+    Raises BakeError if the spool cannot be written to.
+    """
     taken = spool.claimed(digest) | spool.done(digest)
     for task in range(count):
         try:
             if task not in taken and spool.claim(digest, task):
                 return task
         except BakeError:
-            return None  # the call, or the bake, has ended
+            if spool.is_over():
+                return None
+            raise
     return None

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from radiosity_addon.farm.identity import identity
 from radiosity_addon.farm.objects import ObjectError, digest_of
 from radiosity_addon.farm.spool import this_process
 from radiosity_addon.farm.status import status_lines
+from radiosity_addon.farm.tasks import KERNELS
 from radiosity_addon.farm.worker import work
 
 
@@ -121,6 +123,34 @@ def test_a_disk_that_is_full_at_first_can_be_emptied(tmp_path: Path, monkeypatch
         with pytest.raises(BakeError, match="No space left on device"):
             spool.put_array(np.arange(5000.0))
     assert list((tmp_path / "aside").iterdir()) == []
+
+
+def test_arrays_that_do_not_fit_say_why(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """NumPy's error has no reason in the system's words."""
+
+    def save(*_: object, **__: object) -> None:
+        raise OSError("5000 requested and 0 written")
+
+    monkeypatch.setattr(np, "save", save)
+    with pytest.raises(BakeError, match=r"cannot write to spool '.*': its disk may be full; see to it"):
+        spool.put_array(np.arange(5000.0))
+
+
+def test_a_worker_that_cannot_write_says_so(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would else wait for an hour, and nobody knew why."""
+    kernel = f'{{"partial": [{{"function": "{min(KERNELS)}"}}, {{"tuple": []}}, {{"dict": []}}]}}'
+    digest = spool.put_call(f'{{"kernel": {kernel}, "slices": [[0, 1]]}}')
+    to_open = Path.open
+
+    def denied(self: Path, mode: str = "r", *more: Any, **named: Any) -> Any:
+        if "r" not in mode:
+            raise PermissionError(13, "Permission denied")
+        return to_open(self, mode, *more, **named)
+
+    monkeypatch.setattr(Path, "open", denied)
+    with pytest.raises(BakeError, match=r"cannot write to spool '.*': Permission denied"):
+        work(Spool.to_work(spool.path), 0.1)
+    assert spool.claimed(digest) == set()
 
 
 def test_a_result_that_comes_after_the_end_leaves_nothing(spool: Spool) -> None:
