@@ -31,7 +31,10 @@ PACKAGE = __name__.rpartition(".farm.")[0]
 """The package's name, which differs from installation to installation."""
 
 ROOMS = ("numerics", "rays", "form_factors", "lights", "scene", "solver", "lightmap")
-"""Rooms whose classes and functions may be named."""
+"""Rooms whose classes and functions may be named, …"""
+
+NOT_NAMED = "lightmap.charts"
+"""… except those that start processes and give meshes to xatlas, which trusts them: no kernel needs any."""
 
 INLINE_BYTES = 1 << 10
 """Smaller arrays are a part of their object."""
@@ -203,7 +206,7 @@ def name_of(what: type | FunctionType) -> str:
     module = what.__module__ or ""
     room = module.removeprefix(f"{PACKAGE}.")
     name = f"{room}:{what.__qualname__}"
-    if room == module or room.split(".")[0] not in ROOMS or "." in what.__qualname__:
+    if room == module or not _may_be_named(room) or "." in what.__qualname__:
         raise TypeError(f"'{module}.{what.__qualname__}' cannot be stored")
     return name
 
@@ -211,12 +214,16 @@ def name_of(what: type | FunctionType) -> str:
 def named(name: str) -> Any:
     """Return the class or function of a name. Raises ObjectError if it is none of ours."""
     room, _, what = name.partition(":")
-    if room.split(".")[0] not in ROOMS or not all(part.isidentifier() for part in room.split(".")):
+    if not _may_be_named(room) or not all(part.isidentifier() for part in room.split(".")):
         raise ObjectError(f"'{name}' may not be named")
     found = getattr(importlib.import_module(f"{PACKAGE}.{room}"), what, None)
     if not isinstance(found, type | FunctionType) or name_of(found) != name or _is_unsafe(found):
         raise ObjectError(f"'{name}' may not be named")
     return found
+
+
+def _may_be_named(room: str) -> bool:
+    return room.split(".")[0] in ROOMS and not f"{room}.".startswith(f"{NOT_NAMED}.")
 
 
 def _is_unsafe(what: type | FunctionType) -> bool:
@@ -235,7 +242,10 @@ def state_of(value: Any) -> Any:
 
 
 def restore_state(value: Any, state: Any) -> None:
-    """Give a new object the state that `state_of` returned."""
+    """Give a new object the state that `state_of` returned. Raises ObjectError if it replaces methods."""
+    for name in state if isinstance(state, dict) else ():
+        if name.startswith("__") or isinstance(getattr(type(value), name, None), FunctionType):
+            raise ObjectError(f"a {type(value).__name__} with another '{name}'")
     if "__setstate__" in _inherited(type(value)):
         value.__setstate__(state)
         return

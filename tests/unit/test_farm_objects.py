@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from radiosity_addon.farm.objects import ObjectError, Reader, Writer, named
+from radiosity_addon.farm.objects import ObjectError, Reader, Writer, digest_of, name_of, named
 from radiosity_addon.farm.spool import Spool, array_digest
 from radiosity_addon.farm.tasks import KERNELS, is_kernel
 from radiosity_addon.lights import PointLight
@@ -135,6 +135,8 @@ def test_other_things_are_not_written(spool: Spool, value: Any) -> None:
         "farm.spool:Spool",
         "blender.files.files:empty_scene",
         "publishing.publish:publish",
+        "lightmap.charts.xatlas_worker:start_process",
+        "lightmap.charts.xatlas_worker:XatlasProcess",
         "",
         "numerics",
         "numerics.parallel:",
@@ -183,6 +185,16 @@ def test_every_kernel_exists() -> None:
 def test_hostile_trees_are_refused(spool: Spool, tree: Any) -> None:
     with pytest.raises(ObjectError):
         Reader(spool).value(tree)
+
+
+@pytest.mark.parametrize("name", ["shadow_rays", "__class__", "__dict__"])
+def test_states_that_replace_methods_are_refused(spool: Spool, name: str) -> None:
+    """Kernels call methods of what they are given: these must be the class's own."""
+    state = {"dict": [[name, {"function": name_of(thread_count)}]]}
+    text = json.dumps([name_of(PointLight), state])
+    spool.put_object(digest_of(text), text)
+    with pytest.raises(ObjectError, match=f"with another '{name}'"):
+        Reader(spool).value({"object": digest_of(text)})
 
 
 def test_trees_that_are_too_deep_are_refused(spool: Spool) -> None:
