@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, tiles
+from ...numerics import Array, give_back, tiles
 from ...scene import Scene
 from ...solver.gather import Footprints, LightGains, LocalPass, values_of
 from ..points import alike_neighbors
@@ -90,7 +90,9 @@ def light_texels(
     lamps = geometry.scratch.zeros((len(geometry), 3))
     if so_far is not None:
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
+    del emission
     gains = _direct_light(local, geometry, previous, lamps, so_far, progress.part(0.0, DIRECT))
+    give_back()
     more = None if previous is None else lamps - local.direct.lit_by(previous.lit.gains)
     if more is not None:
         local = _brightened(local, element, more)
@@ -103,6 +105,7 @@ def light_texels(
         progress=progress.part(DIRECT, CROSSED),
     )
     table = HitTable(local, geometry, crossings, uneven_texels(geometry, lamps))
+    give_back()
     standing = None if previous is None else StandingHits(previous, table)
     turns = iter([progress.part(CROSSED, 1.0)])
     if more_rays is not None:
@@ -115,6 +118,7 @@ def light_texels(
     else:
         start, transport = standing.start(transport, rows, element, more)
     alike = alike_neighbors(geometry, local.caster, crossings.alone, local.threads)
+    give_back()
     while True:
         light = sweep(
             transport,
@@ -198,6 +202,7 @@ def _trace(
         table.local, table.crossings, settings, table.number, values, kept, met, gathering
     )
     del kept
+    give_back()
     if standing is not None:
         known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)
