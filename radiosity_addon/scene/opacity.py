@@ -28,6 +28,10 @@ from .textures import SurfaceImages
 MOST_LAYERS = 1000
 """A ray that has passed this many surfaces meets no others."""
 
+FAINT = 1.0 / 64.0
+"""Where less light than this share is left, a ray goes on by chance, with as much in the mean (Russian
+roulette; Arvo and Kirk 1990): through dense foliage it would meet all leaves of its way."""
+
 
 def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
     """Return the caster for light of a scene's surfaces; its `for_lamps` is the one for light of lamps."""
@@ -156,7 +160,8 @@ class CutOutCaster:
             at, hits = ways.meet()
             opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
             self._multiply(share, ways.ray[at], 1.0 - opacity)
-            ways.keep(share[ways.ray] > 0.0)
+            _thin_out(share, ways.ray[at], origins, directions, hits.triangle, least)
+            ways.keep(share[ways.ray] > least)
         return share
 
     def passing_colors(
@@ -171,7 +176,8 @@ class CutOutCaster:
             at, hits = ways.meet()
             passes = self._images.passes_at(hits.triangle, hits.barycentric)
             self._multiply(share, ways.ray[at], np.clip(passes, least, 1.0 - least))
-            ways.keep(share[ways.ray].any(axis=1))
+            _thin_out(share, ways.ray[at], origins, directions, hits.triangle, least)
+            ways.keep(share[ways.ray].max(axis=1, initial=0.0) > least)
         return share
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
@@ -319,6 +325,23 @@ class _Ways:
     def keep(self, going: Array) -> None:
         """Go on with the rays of a mask."""
         self.ray, self._gone, self._last = self.ray[going], self._gone[going], self._last[going]
+
+
+def _thin_out(
+    share: Array, ray: Array, origins: Array, directions: Array, triangle: Array, least: float
+) -> None:
+    """Let rays (h,) that have met triangles (h,) go on by chance where their share is faint, in place.
+
+    share (n,) or (n, 3): Of those that end, it becomes `least`.
+    """
+    left = share[ray] if share.ndim == 1 else share[ray].max(axis=1, initial=0.0)
+    rows = np.flatnonzero((left < FAINT) & (left > 0.0))
+    # Where cut-outs coincide, the first of them decides.
+    rows = rows[np.unique(ray[rows], return_index=True)[1]]
+    faint, chance = ray[rows], left[rows] / FAINT
+    goes_on = _drawn(origins[faint], directions[faint], triangle[rows]) < chance
+    share[faint[goes_on]] = (share[faint[goes_on]].T / chance[goes_on]).T
+    share[faint[~goes_on]] = least
 
 
 def _drawn(origins: Array, directions: Array, triangle: Array) -> Array:
