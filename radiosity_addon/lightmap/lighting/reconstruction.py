@@ -20,7 +20,7 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, give_back, tiles
 from ...scene import Scene
-from ...solver.gather import Footprints, LightGains, LocalPass, values_of
+from ...solver.gather import Footprints, LightGains, LocalPass
 from ..points import alike_neighbors
 from ..texels import SmoothLift, TexelGeometry, find_crossings, texel_materials, uneven_texels
 from ..transport import (
@@ -212,9 +212,9 @@ def _trace(
 
 def _hierarchy_start(local: LocalPass, element: Array, geometry: TexelGeometry) -> Array:
     """Return (n, 3) float32 what texels reflect by the hierarchy's light [W/m²]."""
-    start, reflected = geometry.scratch.empty((len(element), 3), np.float32), local.elements.reflected()
+    start = geometry.scratch.empty((len(element), 3), np.float32)
     for tile in tiles(len(element)):
-        start[tile] = values_of(reflected, element[tile])
+        start[tile] = local.elements.reflected_of(element[tile])
     return start
 
 
