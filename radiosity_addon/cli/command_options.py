@@ -30,6 +30,13 @@ class _BakeCommand:
         SECTION,
         instead_of="keep",
     )
+    spool: Path | None = option(
+        None,
+        "Share the bake with workers through this folder, which must be empty or of a bake that did not end; "
+        "see the guide's page on several machines",
+        SECTION,
+        metavar="DIR",
+    )
     check: bool = option(
         False,
         "Bake nothing: show what would be baked, and problems of the scene; the exit code is 1 if a bake "

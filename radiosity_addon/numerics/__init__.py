@@ -5,6 +5,7 @@ Knows neither scenes nor lamps.
 
 from __future__ import annotations
 
+from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .arrays import Array
 from .bilinear import texels_around
 from .curve import along_curve
@@ -12,7 +13,7 @@ from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .heap import give_back
 from .meshes import connected_components, connected_faces, numbered, weld
 from .nearest_triangles import TriangleTree, closest_weights
-from .parallel import fill_chunks, map_chunks, thread_count
+from .parallel import Executor, fill_chunks, map_chunks, run_by, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
 from .radiometry import (
     HEMISPHERE,
@@ -70,9 +71,12 @@ __all__ = [
     "TILE",
     "WHOLE_TRIANGLE",
     "Array",
+    "ArrayFileError",
+    "Executor",
     "Rows",
     "Scratch",
     "Stream",
+    "TooLargeError",
     "TriangleTree",
     "across",
     "along_curve",
@@ -113,8 +117,11 @@ __all__ = [
     "radiance_of_flux",
     "radiance_of_radiosity",
     "radiosity_of_radiance",
+    "read_arrays",
+    "read_digest",
     "reflected_radiance",
     "row_numbers",
+    "run_by",
     "run_chunks",
     "run_numbers",
     "run_starts",
@@ -133,4 +140,5 @@ __all__ = [
     "uniform_cone",
     "weights_at",
     "weld",
+    "write_arrays",
 ]

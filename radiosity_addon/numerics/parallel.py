@@ -4,7 +4,8 @@ A kernel is a function of a module: it takes what it reads and, last, a slice of
 found for these rows. It writes nothing. Callers pass it as `partial(kernel, …)`.
 
 The chunks do not depend on the number of threads, so the result is the same bytes whatever the machine. NumPy
-and embreex release the GIL, so threads are enough.
+and embreex release the GIL, so threads are enough. Within `run_by` an executor may have other processes, also
+on other machines, run a kernel's chunks.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as NotYet
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import partial
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 from ..base import SILENT, Progress
 from .arrays import Array
@@ -24,6 +27,29 @@ T = TypeVar("T")
 
 POLL = 0.1
 """Seconds between looks for cancelation."""
+
+
+class Executor(Protocol):
+    """Runs kernels elsewhere."""
+
+    def run(
+        self, work: Callable[[slice], Any], slices: list[slice], threads: int, progress: Progress
+    ) -> Iterator[Any] | None:
+        """Return what a kernel finds for each slice, in order; None if it is to be run here."""
+
+
+_executor: ContextVar[Executor | None] = ContextVar("executor", default=None)
+"""Of the thread that bakes; kernels run in threads that know of none."""
+
+
+@contextmanager
+def run_by(executor: Executor | None) -> Iterator[None]:
+    """Let an executor run kernels that this thread asks for; None runs them here."""
+    before = _executor.set(executor)
+    try:
+        yield
+    finally:
+        _executor.reset(before)
 
 
 def thread_count(threads: int) -> int:
@@ -49,17 +75,26 @@ def fill_chunks(
     into: Arrays that take what `work` returns, each one of its results.
     at (rows,) int: In which of their rows; None for the same ones.
     """
-    for _ in map_chunks(partial(_store, work, into, at), rows, chunk, threads, progress):
+    if (found := _elsewhere(work, _slices(rows, chunk), threads, progress)) is not None:
+        for piece, values in found:
+            _store(values, into, at, piece)
+        return
+    for _ in map_chunks(partial(_run_and_store, work, into, at), rows, chunk, threads, progress):
         pass
 
 
-def _store(
+def _run_and_store(
     work: Callable[[slice], Array | tuple[Array, ...]],
     into: Array | tuple[Array, ...],
     at: Array | None,
     rows: slice,
 ) -> None:
-    found = work(rows)
+    _store(work(rows), into, at, rows)
+
+
+def _store(
+    found: Array | tuple[Array, ...], into: Array | tuple[Array, ...], at: Array | None, rows: slice
+) -> None:
     place = rows if at is None else at[rows]
     if not isinstance(into, tuple):
         into[place] = found
@@ -84,7 +119,10 @@ def map_chunks(
     threads: 0 means all cores.
     abort: Makes the slices in hand end soon. With it, cancelation is noticed while they are worked on.
     """
-    slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
+    slices = _slices(rows, chunk)
+    if (found := _elsewhere(work, slices, threads, progress)) is not None:
+        yield from found
+        return
     workers = min(thread_count(threads), len(slices))
 
     def one(piece: slice) -> T:
@@ -108,6 +146,19 @@ def map_chunks(
         if abort is not None and not ended:
             abort()
         pool.shutdown(cancel_futures=True)
+
+
+def _slices(rows: int, chunk: int) -> list[slice]:
+    return [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
+
+
+def _elsewhere(
+    work: Callable[[slice], T], slices: list[slice], threads: int, progress: Progress
+) -> Iterator[tuple[slice, T]] | None:
+    """Return each slice with what the executor finds for it; None if the kernel is to be run here."""
+    executor = _executor.get()
+    found = None if executor is None else executor.run(work, slices, threads, progress)
+    return None if found is None else zip(slices, found, strict=True)
 
 
 def _result(future: Future[T], progress: Progress, fraction: float, polls: bool) -> T:

@@ -54,6 +54,12 @@ class Scratch:
         self.in_files = 0
         """Space that arrays in files have used so far [bytes]."""
 
+    def __getstate__(self) -> None:
+        """Another process has a budget of its own."""
+
+    def __setstate__(self, state: object) -> None:
+        self.__init__()  # type: ignore[misc]
+
     def empty(self, shape: int | Sequence[int], dtype: npt.DTypeLike = np.float64) -> Array:
         """Return an uninitialized array."""
         size = math.prod(shape) if isinstance(shape, Sequence) else shape

@@ -69,9 +69,6 @@ class EmbreeCaster:
         for_lamps: RayCaster | None = None,
         two_sided: Array | None = None,
     ) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         self._own_rays = 0
         self.tinted = False
         self._for_lamps = for_lamps
@@ -94,12 +91,29 @@ class EmbreeCaster:
             if len(copied):
                 rows = np.arange(len(two_sided)) if self._rows is None else self._rows
                 self._rows = np.concatenate([rows, rows[copied]])
-        local = np.ascontiguousarray(triangles, dtype=np.float32)
+        self._triangles = np.ascontiguousarray(triangles, dtype=np.float32)
+        self._normals = double_area_vectors(self._triangles)
+        self._build()
+
+    def _build(self) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
         self._scene = EmbreeScene()
-        self._mesh = TriangleMesh(self._scene, local)
-        self._normals = double_area_vectors(local)
+        self._mesh = TriangleMesh(self._scene, self._triangles)
         # The first query builds the hierarchy; it must not race with another thread's.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process needs to make the same caster."""
+        without = ("_scene", "_mesh", "_counting", "_own_rays")
+        return {name: value for name, value in vars(self).items() if name not in without}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._counting, self._own_rays = Lock(), 0
+        if not self._empty:
+            self._build()
 
     @property
     def for_lamps(self) -> RayCaster:

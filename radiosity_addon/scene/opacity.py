@@ -15,6 +15,7 @@ glass that sends no light of its own there is nothing to hit, and the tint is al
 from __future__ import annotations
 
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -129,6 +130,14 @@ class CutOutCaster:
         sides = (None, None) if two_sided is None else (two_sided[whole], two_sided[cut])
         self._whole = EmbreeCaster(triangles[whole], threads, two_sided=sides[0])
         self._cut = EmbreeCaster(triangles[cut], threads, two_sided=sides[1])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process needs to make the same caster."""
+        return {name: value for name, value in vars(self).items() if name not in ("_counting", "_own_rays")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._counting, self._own_rays = Lock(), 0
 
     @property
     def for_lamps(self) -> RayCaster:

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radiosity_addon.bake.sidecar import array_file
-from radiosity_addon.bake.sidecar.array_file import ArrayFileError, TooLargeError, read_arrays, write_arrays
+from radiosity_addon.numerics import array_file
+from radiosity_addon.numerics.array_file import ArrayFileError, TooLargeError, read_arrays, write_arrays
 
 MAGIC = b"TESTS"
 ARRAYS = [

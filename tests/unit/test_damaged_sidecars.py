@@ -13,9 +13,9 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake_and_keep
 from radiosity_addon.bake.relight.kept_bake import relight_pages
-from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
 from radiosity_addon.bake.sidecar.sidecar import FORMAT, MAGIC, read_sidecar, write_sidecar
 from radiosity_addon.base.errors import RadiosityError, SceneError
+from radiosity_addon.numerics.array_file import read_arrays, write_arrays
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.relit_rooms import CHANGED, lit_bake
 

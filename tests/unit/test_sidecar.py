@@ -16,7 +16,6 @@ from radiosity_addon.bake.relight.responses import Responses
 from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.scene_diff import RELIGHTABLE, aligned, compare, dark, scene_record
-from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
 from radiosity_addon.bake.sidecar.plain_objects import restore, stored_names
 from radiosity_addon.bake.sidecar.sidecar import (
     FORMAT,
@@ -29,6 +28,7 @@ from radiosity_addon.bake.sidecar.sidecar import (
 )
 from radiosity_addon.base.errors import BakeError, SceneError
 from radiosity_addon.lights.environment import EnvironmentImage
+from radiosity_addon.numerics.array_file import read_arrays, write_arrays
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.scene.textures import SurfaceImages

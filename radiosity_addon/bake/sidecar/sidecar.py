@@ -27,6 +27,7 @@ from ...lightmap.transport import (
     WarmStart,
 )
 from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
+from ...numerics import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from ...options import BakeSettings
 from ...scene import BakeScene, Faces
 from ...solver.element_transport import ElementTransport, Relightable
@@ -40,7 +41,6 @@ from ..levels import with_levels
 from ..relight import DAMAGED, KeptBake, damaged
 from ..result import BakedObject, BakeResult
 from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
-from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 

@@ -125,6 +125,7 @@ def _run(
                     interrupts,
                     preview=not request.no_preview,
                     form=form,
+                    spool=request.spool,
                 )
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)

@@ -13,6 +13,7 @@ from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, Interrupts, Permissions, summary
+from ...farm import Spool
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -51,6 +52,7 @@ def bake(
     *,
     preview: bool = True,
     form: Form | None = None,
+    spool: Path | None = None,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -76,6 +78,8 @@ def bake(
         Whether a picture of the result is rendered.
     form : Form or None
         What is exported afterwards: its files are checked before the bake starts.
+    spool : Path or None
+        The folder through which workers share the bake.
     """
     with registered():
         source = scene or loaded
@@ -88,6 +92,7 @@ def bake(
         if form is not None:
             check_export(output, form, settings.quantity, allowed)
         keeping = KeepOptions(sidecar=True) if keep else None
+        shared = None if spool is None else Spool.to_bake(spool)
         job = run_bake(
             bpy.context,
             settings,
@@ -96,6 +101,7 @@ def bake(
             keeping=keeping,
             notes=notes,
             with_preview=preview,
+            spool=shared,
         )
         report = run_through(job, console, interrupts)
         if report_copy is not None:

@@ -13,6 +13,7 @@ from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pag
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
 from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
+from ...farm import Spool, shared_bake
 from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
@@ -52,6 +53,7 @@ def run_bake(
     only_changed: bool = False,
     notes: tuple[BakeWarning, ...] = (),
     with_preview: bool = True,
+    spool: Spool | None = None,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -69,6 +71,7 @@ def run_bake(
         then. If objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
     notes: What is known before the bake and belongs into its report.
     with_preview: False leaves `preview.png` out.
+    spool: Through which workers share the bake.
     Yields status: The stage that begins or goes on. A picture holds what the viewports show as surfaces.
     Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
@@ -109,7 +112,7 @@ def run_bake(
         copies = Copies(SAMPLES if with_preview else None) if with_copy and output is not None else None
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         solved, _ = applying(copies)
-        baking = partial(run_pipeline, plan, keeping, sidecar)
+        baking = partial(_share, spool, partial(run_pipeline, plan, keeping, sidecar))
         result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*warnings, *result.warnings))
         seconds.update(result.seconds)
@@ -151,6 +154,16 @@ def _plan(
         return plan, Scope.of(scene, replace(export, bake_scene=plan.bake_scene), is_partial=True), ()
     cannot_keep = scope.in_scene and keeping is not None
     return plan, scope, (_cannot_relight(len(scope.in_scene)),) if cannot_keep else ()
+
+
+def _share(
+    spool: Spool | None,
+    baking: Callable[[Progress], tuple[BakeResult, KeptBake | None]],
+    progress: Progress,
+) -> tuple[BakeResult, KeptBake | None]:
+    """Run the pipeline, with the help of workers if there is a spool."""
+    with shared_bake(spool):
+        return baking(progress)
 
 
 def _solve(

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from ...base import BakeError
+from ..base import BakeError
 
 Array = npt.NDArray[Any]
 

@@ -1,0 +1,136 @@
+"""The bake's side: gives kernels away through a spool, helps, and takes up what was found."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Any
+
+from ..base import Progress
+from ..numerics import run_by, thread_count
+from .objects import ObjectError, Writer
+from .published import PublishedArrays
+from .spool import Spool
+from .tasks import is_kernel, run_task, task_count, values_of
+
+FEWEST = 2
+"""Slices of a kernel that is given away, at least."""
+
+POLL = 0.02
+"""Seconds between looks for results."""
+
+PATIENCE = 2.0
+"""Seconds, and …"""
+
+TIMES = 3.0
+"""… times what a task takes, after which a task that was claimed is done here: its worker may be gone."""
+
+
+class FolderExecutor:
+    """Gives kernels of many slices away through a spool; see `numerics.Executor`."""
+
+    def __init__(self, spool: Spool) -> None:
+        self._spool = spool
+        self._store = PublishedArrays(spool)
+
+    def run(
+        self, work: Callable[[slice], Any], slices: list[slice], threads: int, progress: Progress
+    ) -> Iterator[Any] | None:
+        """See `numerics.Executor`."""
+        if len(slices) < FEWEST or not isinstance(work, partial) or not is_kernel(work.func):
+            return None
+        return self._results(work, slices, thread_count(threads), progress)
+
+    def _results(
+        self, work: partial[Any], slices: list[slice], threads: int, progress: Progress
+    ) -> Iterator[Any]:
+        bounds = [[piece.start, piece.stop] for piece in slices]
+        tree = Writer(self._store).tree(work)
+        digest = self._spool.put_call(json.dumps({"kernel": tree, "slices": bounds}))
+        call = _SharedCall(self._spool, digest, work, bounds, threads)
+        try:
+            for task in range(call.count):
+                yield from call.result(task, progress)
+                progress.at((task + 1) / call.count)
+        finally:
+            self._spool.close_call()
+            call.close()
+
+
+class _SharedCall:
+    """A call whose tasks are done by workers, and here on some threads."""
+
+    def __init__(
+        self, spool: Spool, digest: str, work: partial[Any], bounds: list[list[int]], threads: int
+    ) -> None:
+        self.count = task_count(len(bounds))
+        self._spool, self._digest, self._work, self._bounds = spool, digest, work, bounds
+        self._threads, self._pool = threads, ThreadPoolExecutor(threads)
+        self._running: dict[Future[list[Any]], int] = {}
+        self._found: dict[int, list[Any]] = {}
+        self._longest = 0.0
+
+    def close(self) -> None:
+        """Wait for what is being done here."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def result(self, task: int, progress: Progress) -> list[Any]:
+        """Return what a task found: wait for it, doing others meanwhile, and this one if nobody does."""
+        since = time.monotonic()
+        while True:
+            found = self._found.pop(task, None) or self._stored(task)
+            if found is not None:
+                return found
+            self._do_free_tasks(task)
+            here = task in self._running.values()
+            if not here and time.monotonic() - since > max(PATIENCE, TIMES * self._longest):
+                self._do(task)
+            progress.at(task / self.count)
+            self._spool.give_sign()
+            if not self._running:
+                time.sleep(POLL)
+                continue
+            for future in wait(self._running, POLL, FIRST_COMPLETED).done:
+                self._found[self._running.pop(future)] = future.result()
+
+    def _stored(self, task: int) -> list[Any] | None:
+        """Return what a task found, if that is in the spool, and not damaged."""
+        stored = self._spool.result(self._digest, task)
+        with suppress(ObjectError):
+            return None if stored is None else values_of(*stored)
+        return None
+
+    def _do_free_tasks(self, first: int) -> None:
+        """Do tasks from `first` on that nobody has claimed, one on each thread."""
+        if len(self._running) >= self._threads:
+            return
+        taken = self._spool.claimed(self._digest) | self._spool.done(self._digest)
+        for task in range(first, self.count):
+            if len(self._running) >= self._threads:
+                return
+            if task not in taken and self._spool.claim(self._digest, task):
+                self._do(task)
+
+    def _do(self, task: int) -> None:
+        self._running[self._pool.submit(self._timed, task)] = task
+
+    def _timed(self, task: int) -> list[Any]:
+        started = time.monotonic()
+        found = run_task(self._spool, self._digest, task, self._work, self._bounds)
+        self._longest = max(self._longest, time.monotonic() - started)
+        return found
+
+
+@contextmanager
+def shared_bake(spool: Spool | None) -> Iterator[None]:
+    """Share what is baked within through a spool, which is emptied when it ends well; None shares nothing."""
+    if spool is None:
+        yield
+        return
+    with run_by(FolderExecutor(spool)):
+        yield
+    spool.end()

@@ -1,0 +1,362 @@
+"""The folder that the processes of one bake share.
+
+    spool.json               what it is, and which program may work in it
+    arrays/DIGEST.npy        arrays that kernels read
+    objects/DIGEST.json      objects that they read
+    calls/DIGEST/call.json   a kernel, what it reads, and its slices
+    calls/DIGEST/N.claim     some process is at task N: a few slices
+    calls/DIGEST/N.result    what the task found
+    open                     the digest of the call that waits for its tasks
+    baking                   which process bakes
+    over                     the bake has ended
+
+Everything is written aside and renamed, and checked by its digest when it is read: what is not whole is
+found, and made again, so nothing has to be synced. Running a task twice does no harm, so nothing is locked.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import socket
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base import BakeError
+from ..numerics import ArrayFileError, read_arrays, write_arrays
+from .identity import identity
+from .objects import KINDS, ObjectError, digest_of
+from .recent import Recent
+
+Array = npt.NDArray[Any]
+
+MAGIC, FORMAT = b"RADIOSITYTASK", 1
+KIND = "radiosity spool"
+
+SILENCE = 60.0
+"""Seconds after which a bake of another machine that gave no sign is gone."""
+
+_DIGEST = re.compile(r"[0-9a-f]{40}")
+_FOLDERS = ("arrays", "objects", "calls", "aside")
+_OURS = re.compile(
+    r"(arrays/[0-9a-f]{40}\.npy|objects/[0-9a-f]{40}\.json|calls/[0-9a-f]{40}/(call\.json|\d+\.(claim|result))"
+    r"|aside/[0-9a-f]{32})"
+)
+
+
+class Spool:
+    """A spool that exists, or is made.
+
+    path: Its folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.expanduser().resolve()
+        self._arrays: Recent[Array] = Recent()
+
+    @classmethod
+    def to_bake(cls, path: Path) -> Spool:
+        """Return a spool to bake with: a new one in an empty folder, or one of this program.
+
+        Raises BakeError if the folder holds other things, another bake uses it, or it cannot be written to.
+        """
+        spool = cls(path)
+        with _explained(spool.path):
+            spool.path.mkdir(parents=True, exist_ok=True)
+            record = spool.path / "spool.json"
+            if not record.exists():
+                if any(spool.path.iterdir()):
+                    raise BakeError(f"'{spool.path}' is not empty and no spool: give an empty folder")
+                spool._write(record, json.dumps({"kind": KIND, "program": identity()}).encode())
+            spool.check()
+            spool._refuse_second_bake()
+            for name in _FOLDERS:
+                (spool.path / name).mkdir(exist_ok=True)
+            with contextlib.suppress(FileNotFoundError):
+                (spool.path / "over").unlink()
+            spool._write(spool.path / "baking", this_process().encode())
+        return spool
+
+    def _refuse_second_bake(self) -> None:
+        sign = self.path / "baking"
+        try:
+            host, number = sign.read_text().split()
+            if [host, number] == this_process().split():
+                return
+            alive = is_alive(int(number)) if host == socket.gethostname() else self._silence() < SILENCE
+        except (OSError, ValueError):
+            return
+        if alive:
+            raise BakeError(
+                f"spool '{self.path}' is used by process {number} on {host}: give each bake its own "
+                f"(if that is no bake, remove '{sign}')"
+            )
+
+    def _silence(self) -> float:
+        """Return for how long the bake has given no sign [s]."""
+        return time.time() - (self.path / "baking").stat().st_mtime
+
+    def give_sign(self) -> None:
+        """Show now and then that the bake goes on."""
+        with contextlib.suppress(OSError):
+            if self._silence() > SILENCE / 10:
+                (self.path / "baking").touch()
+
+    @classmethod
+    def to_work(cls, path: Path) -> Spool:
+        """Return a spool that a bake has made. Raises BakeError if there is none, or of another program."""
+        spool = cls(path)
+        spool.check()
+        return spool
+
+    def check(self) -> None:
+        """Refuse what is no spool, or one of another program: its bytes would differ."""
+        try:
+            record = json.loads((self.path / "spool.json").read_bytes())
+        except (OSError, ValueError, RecursionError):
+            record = None
+        if not isinstance(record, dict) or record.get("kind") != KIND:
+            raise BakeError(f"'{self.path}' is no spool; start the bake first, with --spool")
+        theirs, ours = record.get("program"), identity()
+        if not isinstance(theirs, dict) or theirs != ours:
+            theirs = theirs if isinstance(theirs, dict) else {}
+            differing = [name for name in ours if theirs.get(name) != ours[name]]
+            name = differing[0] if differing else "program"
+            raise BakeError(
+                f"spool '{self.path}' is of another {name} ({theirs.get(name, 'unknown')}, here "
+                f"{ours.get(name)}): the lightmap would not be the same bytes; use one version on machines "
+                "of one kind"
+            )
+
+    # Objects and arrays
+
+    def put_object(self, digest: str, text: str) -> None:
+        """See `Store`."""
+        path = self._at("objects", digest, ".json")
+        if not path.exists() or path.read_bytes() != text.encode():
+            self._write(path, text.encode())
+
+    def object(self, digest: str) -> str:
+        """See `Store`."""
+        text = self._read(self._at("objects", digest, ".json")).decode()
+        if digest_of(text) != digest:
+            raise ObjectError(f"object {digest} is damaged")
+        return text
+
+    def put_array(self, array: Array) -> str:
+        """See `Store`."""
+        array = np.ascontiguousarray(array)
+        digest = array_digest(array)
+        path = self._at("arrays", digest, ".npy")
+        if not path.exists() or not self._is_whole(digest):
+            aside = self._aside()
+            with _explained(self.path), aside.open("wb") as file:
+                np.save(file, array, allow_pickle=False)
+            self._put(aside, path)
+        return digest
+
+    def _is_whole(self, digest: str) -> bool:
+        try:
+            self._read_array(digest)
+        except ObjectError:
+            return False
+        return True
+
+    def array(self, digest: str) -> Array:
+        """See `Store`; it stays in its file, and is checked when it is first read."""
+        known = self._arrays.get(digest)
+        return self._arrays.put(digest, self._read_array(digest)) if known is None else known
+
+    def _read_array(self, digest: str) -> Array:
+        path = self._at("arrays", digest, ".npy")
+        try:
+            found = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise ObjectError(f"array {digest}: {error}") from error
+        array = np.asarray(found)
+        if array.dtype.kind not in KINDS or array_digest(array) != digest:
+            raise ObjectError(f"array {digest} is damaged")
+        return array
+
+    # Calls and tasks
+
+    def put_call(self, text: str) -> str:
+        """Write a call, and show it as the one that waits; return its digest."""
+        digest = digest_of(text)
+        folder = self._at("calls", digest)
+        with _explained(self.path):
+            folder.mkdir(exist_ok=True)
+            if not (folder / "call.json").exists():
+                self._write(folder / "call.json", text.encode())
+            # Whoever made claims in an earlier run may be gone.
+            for claim in folder.glob("*.claim"):
+                with contextlib.suppress(OSError):
+                    claim.unlink()
+        self._write(self.path / "open", digest.encode())
+        return digest
+
+    def open_call(self) -> str | None:
+        """Return the digest of the call that waits for its tasks, if there is one."""
+        with contextlib.suppress(OSError, ValueError):
+            digest = (self.path / "open").read_bytes()[:64].decode().strip()
+            return digest if _DIGEST.fullmatch(digest) else None
+        return None
+
+    def call(self, digest: str) -> Any:
+        """Return a call. Raises ObjectError if it is damaged."""
+        text = self._read(self._at("calls", digest) / "call.json").decode()
+        if digest_of(text) != digest:
+            raise ObjectError(f"call {digest} is damaged")
+        return json.loads(text)
+
+    def close_call(self) -> None:
+        """Show no call as waiting."""
+        with contextlib.suppress(OSError):
+            (self.path / "open").unlink()
+
+    def claim(self, digest: str, task: int) -> bool:
+        """Return whether a task was free, and is now claimed."""
+        try:
+            with (self._at("calls", digest) / f"{task}.claim").open("x") as file:
+                file.write(this_process())
+        except FileExistsError:
+            return False
+        except OSError as error:
+            raise _full(self.path, error) from error
+        return True
+
+    def done(self, digest: str) -> set[int]:
+        """Return the tasks of a call that have results."""
+        return {int(name.stem) for name in self._tasks(digest, ".result")}
+
+    def claimed(self, digest: str) -> set[int]:
+        """Return the tasks of a call that are claimed."""
+        return {int(name.stem) for name in self._tasks(digest, ".claim")}
+
+    def _tasks(self, digest: str, suffix: str) -> Iterator[Path]:
+        with contextlib.suppress(OSError):
+            for path in self._at("calls", digest).iterdir():
+                if path.suffix == suffix and path.stem.isdecimal():
+                    yield path
+
+    def put_result(self, digest: str, task: int, tree: Any, arrays: list[Array]) -> None:
+        """Write what a task found."""
+        aside = self._aside()
+        with _explained(self.path):
+            write_arrays(aside, MAGIC, FORMAT, tree, arrays)
+        self._put(aside, self._at("calls", digest) / f"{task}.result")
+
+    def result(self, digest: str, task: int) -> tuple[Any, list[Array]] | None:
+        """Return what a task found; None, with the file removed, if it is damaged."""
+        path = self._at("calls", digest) / f"{task}.result"
+        try:
+            return read_arrays(path, MAGIC, FORMAT)
+        except FileNotFoundError:
+            return None
+        except ArrayFileError:
+            with contextlib.suppress(OSError):
+                path.unlink()
+            return None
+        except OSError as error:
+            raise BakeError(f"cannot read '{path}': {error.strerror}") from error
+
+    def end(self) -> None:
+        """Tell all workers that the bake has ended, and remove what it left."""
+        self._write(self.path / "over", b"")
+        self.close_call()
+        with contextlib.suppress(OSError):
+            (self.path / "baking").unlink()
+        for name in _FOLDERS:
+            # Deepest first; what others put there stays, and the folders around it.
+            for path in sorted((self.path / name).rglob("*"), reverse=True):
+                with contextlib.suppress(OSError):
+                    if path.is_dir():
+                        path.rmdir()
+                    elif _OURS.fullmatch(path.relative_to(self.path).as_posix()):
+                        path.unlink()
+            with contextlib.suppress(OSError):
+                (self.path / name).rmdir()
+
+    def is_over(self) -> bool:
+        """Return whether the bake has ended."""
+        return (self.path / "over").exists() or not (self.path / "spool.json").exists()
+
+    # Files
+
+    def _at(self, folder: str, digest: str, suffix: str = "") -> Path:
+        if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
+            raise ObjectError("a name that is no digest")
+        return self.path / folder / f"{digest}{suffix}"
+
+    def _read(self, path: Path) -> bytes:
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise ObjectError(f"'{path}' cannot be read: {error.strerror}") from error
+
+    def _aside(self) -> Path:
+        folder = self.path / "aside"
+        with _explained(self.path):
+            folder.mkdir(exist_ok=True)
+        return folder / uuid.uuid4().hex
+
+    def _write(self, path: Path, content: bytes) -> None:
+        aside = self._aside() if path.parent != self.path else path.with_name(f".{uuid.uuid4().hex}")
+        with _explained(self.path), aside.open("wb") as file:
+            file.write(content)
+        self._put(aside, path)
+
+    def _put(self, aside: Path, path: Path) -> None:
+        with _explained(self.path):
+            aside.replace(path)
+
+
+def this_process() -> str:
+    """Return this machine's name and the number of this process."""
+    return f"{socket.gethostname()} {os.getpid()}"
+
+
+def is_alive(number: int) -> bool:
+    """Return whether a process of this machine runs."""
+    if sys.platform == "win32":
+        return False  # to send signal 0 there would end it
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        pass  # somebody else's
+    return True
+
+
+def array_digest(array: Array) -> str:
+    """Return the digest of an array's type, shape and numbers."""
+    array = np.ascontiguousarray(array)
+    digest = hashlib.blake2b(f"{array.dtype.str}{array.shape}".encode(), digest_size=20)
+    if array.size:
+        digest.update(array.reshape(-1).view(np.uint8).data)
+    return digest.hexdigest()
+
+
+@contextlib.contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise _full(path, error) from error
+
+
+def _full(path: Path, error: OSError) -> BakeError:
+    return BakeError(
+        f"cannot write to spool '{path}': {error.strerror}; see to it and start again: what is done is kept"
+    )

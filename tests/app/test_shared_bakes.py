@@ -1,0 +1,250 @@
+"""A bake that several processes share gives the same bytes, whatever happens to them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from radiosity_addon.bake.pipeline import bake, bake_and_keep
+from radiosity_addon.base import BakeError
+from radiosity_addon.blender.command_line.main import main
+from radiosity_addon.farm import Spool, shared_bake
+from radiosity_addon.farm.tasks import KERNELS
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
+from tests.glass_rooms import glazed_room
+from tests.moved_rooms import room
+from tests.processes import ROOT
+
+SETTINGS = BakeSettings(resolution=320, quality="sketch", threads=1)
+
+ROOMS = {"room": room, "glass": glazed_room}
+
+BAKE = """
+import sys
+from pathlib import Path
+from radiosity_addon.farm import Spool, shared_bake
+from tests.app.test_shared_bakes import baked_bytes, ROOMS
+print(baked_bytes(ROOMS[sys.argv[2]](), Path(sys.argv[1])))
+"""
+
+
+def baked_bytes(scene: BakeScene, spool: Path | None = None) -> str:
+    """Return a digest of a scene's lightmap, baked here or with the workers of a spool."""
+    with shared_bake(None if spool is None else Spool.to_bake(spool)):
+        result = bake(scene, SETTINGS)
+    return hashlib.sha1(b"".join(page.pixels.tobytes() for page in result.pages)).hexdigest()
+
+
+@pytest.fixture(scope="module", params=sorted(ROOMS))
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def alone(name: str) -> str:
+    """The lightmap that one process bakes."""
+    return baked_bytes(ROOMS[name]())
+
+
+@pytest.fixture
+def workers(tmp_path: Path) -> Iterator[Callable[[], subprocess.Popen[str]]]:
+    """Starts workers of `tmp_path / "spool"`, as soon as it exists."""
+    with ExitStack() as stack:
+
+        def start() -> subprocess.Popen[str]:
+            until((tmp_path / "spool" / "spool.json").exists)
+            words = [sys.executable, "-m", "radiosity_addon.farm", "worker", str(tmp_path / "spool")]
+            worker = subprocess.Popen(
+                [*words, "--idle", "60"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+            stack.callback(worker.wait)
+            stack.callback(worker.kill)
+            return worker
+
+        yield start
+
+
+def start_bake(spool: Path, name: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", BAKE, str(spool), name], cwd=ROOT, stdout=subprocess.PIPE, text=True
+    )
+
+
+def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_any_number_of_workers_gives_the_same_bytes(
+    count: int, name: str, alone: str, tmp_path: Path, workers: Callable[[], subprocess.Popen[str]]
+) -> None:
+    Spool.to_bake(tmp_path / "spool")
+    helping = [workers() for _ in range(count)]
+    assert baked_bytes(ROOMS[name](), tmp_path / "spool") == alone
+    done = [worker.communicate(timeout=60) for worker in helping]
+    assert all(worker.returncode == 0 for worker in helping), done
+    # What the bake leaves: nothing but that it was here.
+    assert sorted(path.name for path in (tmp_path / "spool").iterdir()) == ["over", "spool.json"]
+    if count:
+        assert sum(int(said.split()[0]) for said, _ in done) > 0
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal here")
+@pytest.mark.parametrize(
+    "kernel", ["solver.gather.soft_shadows:_shadowed", "solver.gather.final_gather:_trace"]
+)
+def test_a_worker_that_is_killed_costs_its_task_alone(
+    kernel: str, name: str, alone: str, tmp_path: Path, workers: Callable[[], subprocess.Popen[str]]
+) -> None:
+    baking = start_bake(tmp_path / "spool", name)
+    worker = workers()
+
+    def is_at_it() -> bool:
+        assert baking.poll() is None
+        return any(
+            f'"{kernel}"' in call.read_text() and who(call.parent, worker.pid)
+            for call in (tmp_path / "spool" / "calls").glob("*/call.json")
+        )
+
+    until(is_at_it)
+    os.kill(worker.pid, signal.SIGKILL)
+    assert baking.communicate(timeout=120)[0].strip() == alone
+
+
+def who(call: Path, pid: int) -> bool:
+    """Return whether a process has claimed a task of a call."""
+    claims = (claim.read_text().split() for claim in call.glob("*.claim"))
+    return any(words and words[-1] == str(pid) for words in claims)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal here")
+def test_a_bake_that_is_killed_goes_on_where_it_was(name: str, alone: str, tmp_path: Path) -> None:
+    spool = tmp_path / "spool"
+    baking = start_bake(spool, name)
+    until(lambda: len(list(spool.glob("calls/*/*.result"))) > 12)
+    baking.kill()
+    baking.wait()
+    before = {path: path.stat().st_mtime_ns for path in spool.glob("calls/*/*.result")}
+    # What is damaged meanwhile is done again, and nothing else.
+    truncated, flipped = sorted(before)[:2]
+    truncated.write_bytes(truncated.read_bytes()[:-1])
+    content = bytearray(flipped.read_bytes())
+    content[-1] ^= 8
+    flipped.write_bytes(content)
+    kept, end = Spool.to_bake(spool), Spool.end
+    seen: dict[Path, int] = {}
+
+    def note(self: Spool) -> None:
+        seen.update((path, path.stat().st_mtime_ns) for path in before)
+        end(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Spool, "end", note)
+        assert baked_bytes(ROOMS[name](), kept.path) == alone
+    again = {path for path in before if seen[path] != before[path]}
+    assert again == {truncated, flipped}
+
+
+def test_kept_bakes_can_be_shared_and_relit(tmp_path: Path) -> None:
+    scene = room()
+    alone, kept = bake_and_keep(scene, SETTINGS)
+    with shared_bake(Spool.to_bake(tmp_path)):
+        shared, also_kept = bake_and_keep(scene, SETTINGS)
+    assert shared.pages[0].pixels.tobytes() == alone.pages[0].pixels.tobytes()
+    for light in kept.lit.gains.gain_of:
+        assert (kept.lit.gains.of(light) == also_kept.lit.gains.of(light)).all()
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no such users here")
+def test_a_full_disk_is_one_line_and_what_is_done_stays(
+    name: str, alone: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count, replace = 0, Path.replace
+
+    def full(self: Path, target: Path) -> Path:
+        nonlocal count
+        count += 1
+        if count > 60:
+            raise OSError(28, "No space left on device")
+        return replace(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", full)
+        with pytest.raises(BakeError, match=r"cannot write to spool .*: No space left on device; .* is kept"):
+            baked_bytes(ROOMS[name](), tmp_path)
+    assert list(tmp_path.glob("calls/*/*.result"))
+    assert baked_bytes(ROOMS[name](), tmp_path) == alone
+
+
+def test_the_command_line_shares_a_bake(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["bake", "--resolution", "64", "--quality", "sketch", "--no-preview", "--quiet"]
+    assert main([*words, "--output", str(tmp_path / "alone")]) == 0
+    assert main([*words, "--output", str(tmp_path / "shared"), "--spool", str(tmp_path / "spool")]) == 0
+    alone, shared = ((tmp_path / name / "lightmap.exr").read_bytes() for name in ("alone", "shared"))
+    assert alone == shared
+    assert not capsys.readouterr().err
+
+
+def test_a_folder_of_other_things_is_refused_before_the_bake(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    assert main(["bake", "--output", str(tmp_path / "out"), "--spool", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.strip().endswith("is not empty and no spool: give an empty folder")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["thesis.txt"]
+
+
+def test_relighting_has_nothing_to_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["bake", "--relight", "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
+    assert main(words) == 2
+    assert "leave --spool out" in capsys.readouterr().err
+    assert not (tmp_path / "spool").exists()
+
+
+def test_a_worker_runs_nothing_but_kernels(tmp_path: Path) -> None:
+    """A call of another function is left alone, and said."""
+    spool = Spool.to_bake(tmp_path)
+    name = "numerics.parallel:thread_count"
+    assert name not in KERNELS
+    empty = '{"tuple": []}, {"dict": []}'
+    spool.put_call(f'{{"kernel": {{"partial": [{{"function": "{name}"}}, {empty}]}}, "slices": [[0, 1]]}}')
+    words = [sys.executable, "-m", "radiosity_addon.farm", "worker", str(tmp_path), "--idle", "0.5"]
+    ran = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert ran.returncode == 0
+    assert "no kernel" in ran.stdout
+    assert "0 tasks done" in ran.stdout
+    assert not list(tmp_path.glob("calls/*/*.result"))
+
+
+def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
+    spool = Spool.to_bake(tmp_path)
+
+    def status() -> str:
+        words = [sys.executable, "-m", "radiosity_addon.farm", "status", str(tmp_path)]
+        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True).stdout
+
+    assert "has not started" in status()
+    name = min(KERNELS)
+    call = (
+        f'{{"kernel": {{"partial": [{{"function": "{name}"}}, 1, 2]}}, "slices": [[0, 1], [1, 2], [2, 3]]}}'
+    )
+    digest = spool.put_call(call)
+    spool.claim(digest, 0)
+    spool.claim(digest, 1)
+    spool.put_result(digest, 1, None, [])
+    assert f"{name}: 1 of 3 tasks done, 1 begun" in status()
+    spool.end()
+    assert "has ended" in status()
