@@ -92,7 +92,7 @@ def light_texels(
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
     del emission
     gains = _direct_light(local, geometry, previous, lamps, so_far, progress.part(0.0, DIRECT))
-    give_back()
+    _give_back(geometry)
     more = None if previous is None else lamps - local.direct.lit_by(previous.lit.gains)
     if more is not None:
         local = _brightened(local, element, more)
@@ -105,7 +105,7 @@ def light_texels(
         progress=progress.part(DIRECT, CROSSED),
     )
     table = HitTable(local, geometry, crossings, uneven_texels(geometry, lamps))
-    give_back()
+    _give_back(geometry)
     standing = None if previous is None else StandingHits(previous, table)
     turns = iter([progress.part(CROSSED, 1.0)])
     if more_rays is not None:
@@ -118,7 +118,7 @@ def light_texels(
     else:
         start, transport = standing.start(transport, rows, element, more)
     alike = alike_neighbors(geometry, local.caster, crossings.alone, local.threads)
-    give_back()
+    _give_back(geometry)
     while True:
         light = sweep(
             transport,
@@ -156,6 +156,12 @@ def light_texels(
     )
     bright = local.gather.bright if standing is None else standing.bright
     return replace(light, kept=lit, traced=LightingRecord(settings, table, layout, rows, bright, error))
+
+
+def _give_back(geometry: TexelGeometry) -> None:
+    """Give back what a step freed, unless memory is short: the budget counts it as used by the next one."""
+    if not geometry.scratch.in_files:
+        give_back()
 
 
 def _direct_light(
@@ -202,7 +208,7 @@ def _trace(
         table.local, table.crossings, settings, table.number, values, kept, met, gathering
     )
     del kept
-    give_back()
+    _give_back(table.geometry)
     if standing is not None:
         known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)

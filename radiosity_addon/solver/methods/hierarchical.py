@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, give_back
+from ...numerics import Array
 from ...scene import Scene
 from ..balance import Conservation, received_by_faces
 from ..hierarchy import ClusterCut, NodeShapes
@@ -237,7 +237,6 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     hierarchy, links, cluster_links = state.hierarchy, state.links, state.cluster_links
     assert state.conservation is not None  # set when the state was made
     state.cut = state.sent = None  # as large as what replaces them
-    give_back()  # and what measuring links freed
     lights = state.direct()
     state.cut = state.linked_cut()
     state.sent = state.conservation.factors(hierarchy, state.cut, links, cluster_links)
