@@ -5,18 +5,23 @@ from __future__ import annotations
 import shutil
 
 from .compare import say
-from .window import ROOT, cornell_window, drive
+from .window import ROOT, cornell_window
 
 IMAGES = ROOT / "docs" / "images"
 
-PICTURES = ("panel", "presets", "check", "progress")
+PICTURES = {
+    **{f"working-{name}": name for name in ("panel", "presets", "check", "progress")},
+    "faces-buttons": "flip-faces",
+}
+"""What windows are photographed as, and what the pictures are called in the guide."""
 
 
 def main() -> None:
     with cornell_window() as (installed, scene):
-        drive(installed, scene, "drive_working.py", ("1280", "800"))
-        for name in PICTURES:
-            shutil.copy(scene.with_name(f"working-{name}.png"), IMAGES / f"{name}.png")
+        for session in ("working", "faces"):
+            installed.drive(f"drive_{session}.py", scene, session)
+        for taken, name in PICTURES.items():
+            shutil.copy(scene.with_name(f"{taken}.png"), IMAGES / f"{name}.png")
             say(f"docs/images/{name}.png")
 
 

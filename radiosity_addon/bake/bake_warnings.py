@@ -1,4 +1,4 @@
-"""What a bake warns of: objects with hardly any texels, and solutions that had to stop early."""
+"""What a bake warns of: objects with too few texels, and solutions that had to stop early."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ..base import BakeWarning
-from ..lightmap.texels import TexelGeometry
+from ..lightmap.texels import TexelGeometry, is_collapsed
 from ..lightmap.unwrap import greedy_object, share_of
 from ..scene import BakeObject, BakeScene, Scene, coincident_triangles
 from ..solver import Solution, SolverSettings
@@ -20,25 +20,41 @@ MAX_NAMED = 5
 MIN_SIDE = 8
 """Objects with fewer texels than the square of this cause a warning."""
 
+THIN_SHARE, THIN_SHARE_OF_ALL = 0.5, 0.05
+"""Objects with this share of their surface, or of that of all objects, on charts narrower than a texel and a
+half cause one too: columns that look square, and feet of walls. The edge of a table top does not."""
+
 
 def small_objects(
     bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
 ) -> Iterator[BakeWarning]:
-    """Warn of objects that get hardly any texels, the largest first, and of one that takes nearly all."""
-    counts = geometry.counts
+    """Warn of objects that get hardly any texels, or only one across, and of one that takes nearly all.
+
+    The one with the largest such surface comes first.
+    """
+    counts, areas = geometry.counts, bake_scene.scene.areas
     texels = [int(counts[item.rows].sum()) for item in baked]
     greedy = greedy_object([item.name for item in baked], texels)
     advice = "raise the resolution or its texel scale"
     if greedy is not None:
         taken = share_of(max(texels), sum(texels))
         advice = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
-    surface = [float(bake_scene.scene.areas[item.rows].sum()) for item in baked]
-    for number in sorted(range(len(baked)), key=lambda number: -surface[number]):
-        name, own = baked[number].name, texels[number]
-        if surface[number] > 0 and own < MIN_SIDE**2:
-            yield BakeWarning(
-                name, f"object '{name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {advice}"
-            )
+    surface = [float(areas[item.rows] @ item.lit) for item in baked]
+    found: list[tuple[float, BakeWarning]] = []
+    for item, own, area in zip(baked, texels, surface, strict=True):
+        # A column of a hundred faces has enough texels, and no more than one across each side.
+        thin = float(areas[item.rows] @ (item.lit & is_collapsed(geometry.uv[item.rows])))
+        if area > 0 and own < MIN_SIDE**2:
+            few = f"{own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}"
+            found.append((area, _few_texels(item.name, few, advice)))
+        elif thin > 0 and (thin >= THIN_SHARE * area or thin >= THIN_SHARE_OF_ALL * sum(surface)):
+            few = f"one texel across {thin / area:.0%} of its surface, {own} texels in all"
+            found.append((thin, _few_texels(item.name, few, advice)))
+    yield from (warning for _, warning in sorted(found, key=lambda each: -each[0]))
+
+
+def _few_texels(name: str, few: str, advice: str) -> BakeWarning:
+    return BakeWarning(name, f"object '{name}' gets only {few}: {advice}")
 
 
 def coincident_counts(objects: Sequence[BakeObject], scene: Scene) -> dict[str, int]:

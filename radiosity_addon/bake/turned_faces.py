@@ -20,7 +20,7 @@ from ..lightmap.texels import TexelGeometry
 from ..lightmap.transport import TexelLight
 from ..numerics import Array, Stream, cosine_hemisphere, stratified_square, tiles, to_world
 from ..rays import NO_HIT
-from ..scene import BakeObject, BakeScene, Scene, inside_out
+from ..scene import BakeObject, BakeScene, Scene, closed_parts, inside_out, places
 from ..solver import Solution
 from ..solver.gather import Footprints, LocalPass
 
@@ -39,6 +39,16 @@ PROBED, PROBES = 64, 16
 
 OPEN = 0.5
 """A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
+
+MOSTLY = 0.9
+"""Where so much of what is lit of a connected part is turned, what gets no light on either side is too:
+the wall behind a cupboard."""
+
+NO_AREA = 1e-12
+"""Triangles without area count as so much of the largest: polygons of nothing else follow their part."""
+
+PROBED_AT_ONCE = 1 << 14
+"""Triangles whose rays are traced together."""
 
 
 def of_turned_faces(
@@ -61,7 +71,7 @@ def of_turned_faces(
     probe = BackProbe(bake_scene.scene, solution.local_pass)
     back = solution.back_irradiance.max(axis=1)
     named = {warning.name for warning in turned}
-    for warning in turned_away(baked, bake_scene.scene.areas, front, back, probe):
+    for warning in turned_away(baked, bake_scene.scene, front, back, probe):
         if warning.name not in named:
             yield warning
 
@@ -75,9 +85,11 @@ def of_inside_out(bake_scene: BakeScene) -> list[BakeWarning]:
         if item.bake and inward > MAX_TURNED_SHARE * whole:
             message = (
                 f"object '{item.name}' is inside out on {inward / whole:.0%} of its surface: normals point "
-                "inward, so its lightmap is black there; use Mesh → Normals → Recalculate Outside"
+                "inward, so its lightmap is black there; use Flip Faces in the panel, or "
+                "Mesh → Normals → Recalculate Outside"
             )
-            warnings.append(BakeWarning(item.name, message))
+            polygons = tuple(np.unique(item.polygon[turned[item.rows]]).tolist())
+            warnings.append(BakeWarning(item.name, message, turned=polygons))
     return warnings
 
 
@@ -86,6 +98,11 @@ class BackProbe:
 
     def __init__(self, scene: Scene, local: LocalPass) -> None:
         self._scene, self._local = scene, local
+
+    def all_lit(self, rows: Array, least: float) -> Array:
+        """Return what `lit` does, for any number of triangles."""
+        chunks = [rows[first : first + PROBED_AT_ONCE] for first in range(0, len(rows), PROBED_AT_ONCE)]
+        return np.concatenate([self.lit(chunk, least) for chunk in chunks])
 
     def lit(self, rows: Array, least: float) -> Array:
         """Return (n,) whether the backs of triangles face lit surfaces, or lamps give them `least` [W/m²]."""
@@ -102,14 +119,14 @@ class BackProbe:
 
 
 def turned_away(
-    objects: Iterable[BakeObject], areas: Array, front: Array, back: Array, probe: BackProbe
+    objects: Iterable[BakeObject], scene: Scene, front: Array, back: Array, probe: BackProbe
 ) -> Iterator[BakeWarning]:
     """Yield a warning for each object with a large area lit from behind, the largest first.
 
     objects: Those that get lightmaps.
-    areas (t,) [m²].
     front, back (t,) [W/m²]: Mean irradiance on both sides of every triangle, of the brightest channel.
     """
+    areas = scene.areas
     of = [(item, areas[item.rows]) for item in objects if areas[item.rows].any()]
     lit = np.maximum(front, back)
     levels = [float(area @ lit[item.rows] / area.sum()) for item, area in of]
@@ -129,12 +146,36 @@ def turned_away(
         if share > MAX_TURNED_SHARE:
             message = (
                 f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
-                "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
-                "that side should be visible"
+                "away from the light, so its lightmap is dark there; flip them (Flip Faces in the panel, or "
+                "Mesh → Normals → Flip) if that side should be visible"
             )
-            found.append((share * float(area.sum()), BakeWarning(item.name, message)))
+            turned = suspects[probe.all_lit(suspects, SEEN * usual)] - item.first
+            unlit = lit[item.rows] <= SEEN * usual
+            polygons = turned_polygons(item, scene.triangles[item.rows], area, turned, unlit)
+            found.append((share * float(area.sum()), BakeWarning(item.name, message, turned=polygons)))
     for _, warning in sorted(found, key=lambda each: -each[0]):
         yield warning
+
+
+def turned_polygons(
+    item: BakeObject, triangles: Array, areas: Array, turned: Array, unlit: Array
+) -> tuple[int, ...]:
+    """Return the polygons of an object that are to be flipped, in ascending order.
+
+    triangles (count, 3, 3), areas (count,) [m²]: The object's.
+    turned (n,) int: Its triangles that are lit from behind only.
+    unlit (count,) bool: Those that get hardly any light on either side: they follow the part they are in.
+    """
+    is_turned = np.zeros(item.count, dtype=bool)
+    is_turned[turned] = True
+    part, _ = closed_parts(places(triangles))
+    of_part = np.bincount(part, areas * is_turned)
+    decided = np.bincount(part, areas * (is_turned | ~unlit))
+    mostly = (of_part > 0) & (of_part >= MOSTLY * decided)
+    is_turned |= unlit & mostly[part]
+    weight = np.maximum(areas, NO_AREA * areas.max())
+    most = np.bincount(item.polygon, weight * is_turned) > 0.5 * np.bincount(item.polygon, weight)
+    return tuple(np.flatnonzero(most).tolist())
 
 
 def front_irradiance(

@@ -6,7 +6,7 @@ Also which of several surfaces in one place counts, and rays that pass through c
 from __future__ import annotations
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene, LevelOfDetail
-from .closed_solids import sealed_backs
+from .closed_solids import closed_parts, places, sealed_backs
 from .coincident_faces import coincident_triangles
 from .faces import Faces
 from .inside_out_parts import inside_out
@@ -28,9 +28,11 @@ __all__ = [
     "Scene",
     "SurfaceImages",
     "arriving",
+    "closed_parts",
     "coincident_triangles",
     "glow_pattern",
     "inside_out",
+    "places",
     "ray_caster",
     "same_glow",
     "sealed_backs",

@@ -49,6 +49,7 @@ class BakeObject:
     glass (count,) bool: Triangles that are glass, which get no texels; None for none.
     page: The shared page that it is to be on, from 1; 0 for any.
     level: Of a coarser level of detail, which has no triangles in the scene; None of all others.
+    winding: Digest of the order in which corners go around the mesh's polygons; "" if it is not known.
     """
 
     name: str
@@ -63,6 +64,7 @@ class BakeObject:
     glass: Array | None = None
     page: int = 0
     level: LevelOfDetail | None = None
+    winding: str = ""
 
     @property
     def rows(self) -> slice:

@@ -62,9 +62,13 @@ def places(corners: Array, apart: Array | None = None) -> Array:
     if apart is not None:
         key += np.repeat(apart, 3).astype(np.uint64)
     for column in bits.T:
-        # One number for three is several times as fast to sort; that two places share one is unlikely.
-        key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
-        key ^= key >> np.uint64(29)
+        # One number for three is several times as fast to sort; that two places share one is unlikely if all
+        # bits of a coordinate count for all bits of it (SplitMix64): opposite places differ in signs alone.
+        key ^= column
+        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+            key ^= key >> np.uint64(shift)
+            key *= np.uint64(factor)
+        key ^= key >> np.uint64(31)
     return np.unique(key, return_inverse=True)[1].reshape(-1, 3)
 
 

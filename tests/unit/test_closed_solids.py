@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from radiosity_addon.scene.closed_solids import places
 from radiosity_addon.solver import AreaLight, PointLight, SolverSettings, SpotLight, SunLight, solve
 from tests.rooms import box_room, gray, gray_scene, rectangle, solid_box, sphere
 
@@ -98,3 +99,11 @@ def test_sealed_backs_have_no_faces_and_the_light_is_the_same() -> None:
         np.testing.assert_allclose(found, known, rtol=0.03, atol=0.02 * known.max())
     power = solution.report["power_W"]
     assert power["absorbed"] + power["escaped"] == pytest.approx(power["emitted"], rel=0.01)
+
+
+def test_places_that_are_nearly_opposite_are_two() -> None:
+    """Of a ball of a hundred rings: all that differs is signs and some last bits."""
+    one = np.array([0.85904342, 0.05404646, 0.50904143], dtype=np.float32)
+    other = np.array([-0.85904342, -0.05404658, 0.50904143], dtype=np.float32)
+    corners = np.stack([one, other, one]).astype(np.float64)[None]
+    assert places(corners).tolist() in ([[0, 1, 0]], [[1, 0, 1]])

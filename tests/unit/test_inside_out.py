@@ -94,6 +94,7 @@ def test_a_small_part_of_an_object_counts_from_a_tenth_of_its_area() -> None:
     chest, hall = solid_box((5, 5, 0), (6, 6, 1)), solid_box((5, 5, 0), (9, 9, 1))
     (warning,) = of_inside_out(scene_of(np.concatenate([chest, lid])))
     assert "is inside out on 25% of its surface" in warning.message
+    assert warning.turned == tuple(range(6, 12))
     assert of_inside_out(scene_of(np.concatenate([hall, lid]))) == []
     unbaked = bake_scene(gray_scene(TURNED), ("Turned", 12, None, False))
     assert of_inside_out(unbaked) == []

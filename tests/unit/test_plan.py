@@ -53,6 +53,7 @@ DIFFERENT = {
     "not baked": (lambda: with_box(bake=False), {Part.ROLE}),
     "sharper": (lambda: with_box(texel_scale=2.0), {Part.MESH}),
     "on page 2": (lambda: with_box(page=2), {Part.MESH}),
+    "other way around": (lambda: with_box(winding="other"), {Part.MESH}),
     "strengths": (lambda: lit_bake(CHANGED), {Part.STRENGTH, Part.EMISSION}),
     "lamp gone": (lambda: with_lights(*LIGHTS[1:]), {Part.LIGHT_REMOVED, Part.LIGHT_ORDER}),
     "lamps swapped": (lambda: with_lights(LIGHTS[1], LIGHTS[0], *LIGHTS[2:]), {Part.LIGHT_ORDER}),

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from radiosity_addon.bake.turned_faces import BackProbe, turned_away
+from radiosity_addon.bake.turned_faces import BackProbe, turned_away, turned_polygons
 from radiosity_addon.lights import EnvironmentLight, SunLight
+from radiosity_addon.numerics import triangle_areas
 from radiosity_addon.scene.bake_scene import BakeScene
-from radiosity_addon.solver import PointLight
+from radiosity_addon.solver import PointLight, Scene
 from tests.rooms import box_room, gray_scene, rectangle, solid_box
 from tests.unit.test_pipeline import run
 from tests.unit.texel_scenes import bake_object, bake_scene
@@ -30,6 +33,12 @@ def told(scene: BakeScene, **settings: int) -> list[str]:
     result = run(scene, **settings)
     said = ("is lit from behind only", "is inside out on 100% of its surface")
     return sorted(w.name for w in result.warnings if any(text in w.message for text in said))
+
+
+def patches(count: int) -> Scene:
+    """Equal triangles apart from each other."""
+    corner = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], dtype=float)
+    return gray_scene(corner + 2.0 * np.arange(count)[:, None, None], two_sided=True)
 
 
 def turned(triangles: np.ndarray) -> np.ndarray:
@@ -57,6 +66,7 @@ def test_a_wall_whose_normals_point_out_of_its_room_is_warned_of(is_turned: bool
     if is_turned:
         (message,) = (w.message for w in result.warnings if w.name == "Wall" and "behind" in w.message)
         assert message.startswith("object 'Wall' is lit from behind only on 100% of its surface")
+        assert [w.turned for w in result.warnings if w.turned] == [(0,)]
 
 
 def tub(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
@@ -103,20 +113,44 @@ def test_a_closed_bulb_is_not_lit_from_behind(shines: bool) -> None:
 
 
 def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_sides() -> None:
-    areas = np.ones(48)
+    scene = patches(48)
     front, back = np.ones(48), np.zeros(48)
     front[:2], back[:2] = 0.0, 1.0
     front[46:], back[46:] = 0.0, 0.05
     many = [bake_object("Mostly Right", 0, 30), bake_object("Closet", 46, 2)]
     probe = AlwaysLit()
-    assert list(turned_away(many, areas, front, back, probe)) == []
-    (warning,) = turned_away([bake_object("Four Walls", 0, 8)], areas, front, back, probe)
+    assert list(turned_away(many, scene, front, back, probe)) == []
+    (warning,) = turned_away([bake_object("Four Walls", 0, 8)], scene, front, back, probe)
     assert warning.name == "Four Walls"
     assert "on 25% of its surface" in warning.message
+    assert warning.turned == (0,)
     back[46:] = 0.5
-    assert [warning.name for warning in turned_away(many, areas, front, back, probe)] == ["Closet"]
+    assert [warning.name for warning in turned_away(many, scene, front, back, probe)] == ["Closet"]
+
+
+def test_what_gets_no_light_turns_with_the_part_that_it_is_in() -> None:
+    """Polygons are turned by most of their area; what is lit in front never is."""
+    wall = rectangle((0, 0, 0), (4, 0, 0), (0, 0, 4), 4)
+    other = rectangle((9, 0, 0), (1, 0, 0), (0, 0, 1), 4)
+    polygon = np.concatenate([np.tile(np.arange(16), 2), 16 + np.arange(32) // 2])
+    item = replace(bake_object("Walls", 0, 64), polygon=polygon)
+    is_turned, unlit = np.zeros(64, dtype=bool), np.zeros(64, dtype=bool)
+    is_turned[:32] = True
+    is_turned[[0, 5, 6, 22]] = False
+    unlit[[0, 5]] = True
+    unlit[32:] = True
+
+    def found(rows: np.ndarray) -> tuple[int, ...]:
+        triangles = np.concatenate([wall, other])
+        return turned_polygons(item, triangles, triangle_areas(triangles), np.flatnonzero(rows), unlit)
+
+    # 6 and 22 are a polygon that is lit in front; 0 and 5 are each half of one, and behind a cupboard.
+    assert found(is_turned) == (*range(6), *range(7, 16))
+    # As soon as more of the wall is lit in front, they stay.
+    is_turned[[7, 23]] = False
+    assert found(is_turned) == (*range(1, 5), *range(8, 16))
 
 
 def test_without_light_nothing_is_turned_away() -> None:
     objects = [bake_object("Dark", 0, 2)]
-    assert list(turned_away(objects, np.ones(2), np.zeros(2), np.zeros(2), AlwaysLit())) == []
+    assert list(turned_away(objects, patches(2), np.zeros(2), np.zeros(2), AlwaysLit())) == []

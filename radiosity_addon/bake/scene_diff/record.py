@@ -31,7 +31,8 @@ OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_sec
 class ObjectRecord(NamedTuple):
     """Digests of one object's parts.
 
-    mesh: How triangles belong to polygons and loops, which have no area, and the texel scale.
+    mesh: How triangles belong to polygons and loops, how these go around, which have no area, and the texel
+        scale.
     role: Whether it gets a lightmap, bounces light, casts shadows and has two sides.
     place: Triangles and shading normals.
     surface: Means of reflectance and opacity over its triangles.
@@ -139,10 +140,11 @@ def _record_of(bake_scene: BakeScene, item: BakeObject, laid_out: Array | None) 
     emitter = () if bake_scene.emitter is None or not emits.any() else (bake_scene.emitter[rows][emits],)
     triangle = np.arange(item.first, item.first + item.count)
     page = (np.array(item.page),) if item.page else ()
+    winding = (np.frombuffer(item.winding.encode(), dtype=np.uint8),) if item.winding else ()
     level = item.level
     faces = (item.polygon, item.loops) if level is None else (level.polygon, level.loops)
     return ObjectRecord(
-        mesh=_digest(*faces, scene.areas[rows] > 0, np.array(item.texel_scale), *page),
+        mesh=_digest(*faces, scene.areas[rows] > 0, np.array(item.texel_scale), *page, *winding),
         role=_digest(
             np.array(item.bake), scene.two_sided[rows], scene.in_bounces[rows], scene.in_shadows[rows]
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import bpy
@@ -26,6 +27,7 @@ class MeshArrays:
     polygon (t,) int32: The polygon each triangle is part of.
     material (t,) int32: The slot of each triangle's polygon.
     lightmap_uv (t, 3, 2) float32: The UVs of the layer `Lightmap`, where there is one.
+    winding: Digest of the order in which corners go around polygons.
     """
 
     corners: np.ndarray
@@ -35,6 +37,7 @@ class MeshArrays:
     material: np.ndarray
     lightmap_uv: np.ndarray | None
     uv_layers: int
+    winding: str = ""
 
     def __len__(self) -> int:
         return len(self.corners)
@@ -104,7 +107,8 @@ def mesh_arrays(raw: RawMesh) -> MeshArrays | None:
     flat = _flat(raw)[polygon]
     normals[flat] = _unit_normals(np.zeros_like(normals[flat]), corners[flat])
     uv = None if raw.lightmap_uv is None else raw.lightmap_uv[loops]
-    return MeshArrays(corners, normals, loops, polygon, raw.material[polygon], uv, raw.uv_layers)
+    winding = hashlib.blake2b(raw.vertex.tobytes(), digest_size=16).hexdigest()
+    return MeshArrays(corners, normals, loops, polygon, raw.material[polygon], uv, raw.uv_layers, winding)
 
 
 def _flat(raw: RawMesh) -> np.ndarray:

@@ -19,6 +19,7 @@ from ...base import BakeWarning, Status, staged
 from ...files import KEPT, PLAIN_NAMES, PREVIEW_NAME
 from ...options import BakeSettings
 from ..apply.apply import apply_steps
+from ..apply.face_flips import found_faces
 from ..apply.rebake import EarlierBake, replacing_earlier
 from ..apply.restore import restore
 from ..apply.scopes import files_shown_by, keeping_theirs, of_scene
@@ -144,7 +145,8 @@ def finish(
         keeps_some = scope is not None and bool(scope.in_scene)
         remember(scene, export, result, digests, settings, is_partial=keeps_some)
         folder = "" if output is None else "//" if copies else relative_path(output.path)
-        last_bake.remember(scene, report.as_dict(), folder)
+        turned = found_faces(result.warnings, export.bake_scene.objects, export.sources)
+        last_bake.remember(scene, report.as_dict(), folder, turned)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
         if output is not None and copies is None:
             whole = report.joined(output.earlier, earlier.kept_sources)

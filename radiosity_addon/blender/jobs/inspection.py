@@ -44,9 +44,10 @@ from ..scene_export.page_checks import check_pages
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
+from ..session.turned_faces import TurnedFaces
 from ..settings.properties import look_of
 from .lit_objects import PieceShape, glass_materials, lit_objects, lit_sides, piece_shape
-from .shape_checks import coincident_warnings, inside_out_warnings, unlit_scene
+from .shape_checks import coincident_warnings, faces_of, inside_out_warnings, unlit_scene
 
 if TYPE_CHECKING:
     from ..cycles.lamps import LampFactors
@@ -96,6 +97,8 @@ class Inspection:
     estimate : Estimate
     findings : tuple of Finding
         The worst first.
+    turned : tuple of TurnedFaces
+        Faces that the findings name.
     """
 
     objects: int
@@ -103,6 +106,7 @@ class Inspection:
     scene_triangles: int
     estimate: Estimate
     findings: tuple[Finding, ...]
+    turned: tuple[TurnedFaces, ...] = ()
 
     @property
     def texels(self) -> int:
@@ -169,6 +173,7 @@ def inspect(
     if refused is not None:
         findings.append(Finding(ERROR, "file", refused))
     shown = unlit_scene(collected, chosen)
+    inside_out = inside_out_warnings(shown)
     findings += [
         *_of_the_file(folder),
         *_of_light(context, collected, settings),
@@ -179,7 +184,7 @@ def inspect(
         *_of_texels(lit, plan, settings),
         *_of_scales(collected),
         *_of_size(shapes),
-        *(Finding(WARNING, warning.name, warning.message) for warning in inside_out_warnings(shown)),
+        *(Finding(WARNING, warning.name, warning.message) for warning in inside_out),
         *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
         *(Finding(INFO, warning.name, warning.message) for warning in coincident_warnings(shown)),
     ]
@@ -190,6 +195,7 @@ def inspect(
         scene_triangles=triangles,
         estimate=plan,
         findings=tuple(dict.fromkeys(findings)),
+        turned=faces_of(inside_out, shown, collected),
     )
 
 

@@ -9,8 +9,10 @@ import numpy as np
 from ...bake import coincident_counts, of_coincident, of_inside_out
 from ...base import BakeWarning
 from ...scene import BakeObject, BakeScene, Scene
+from ..apply.face_flips import found_faces
 from ..datablocks.mesh_arrays import world_from_object
 from ..scene_records.pieces import Piece, SceneContents
+from ..session.turned_faces import TurnedFaces
 
 MOST_SEARCHED = 500_000
 """Triangles that are searched for others in their place: it takes about 10 µs for each."""
@@ -52,6 +54,14 @@ def unlit_scene(collected: SceneContents, chosen: Sequence[Piece]) -> BakeScene 
 def inside_out_warnings(bake_scene: BakeScene | None) -> Sequence[BakeWarning]:
     """Name the objects that are inside out."""
     return [] if bake_scene is None else of_inside_out(bake_scene)
+
+
+def faces_of(
+    warnings: Sequence[BakeWarning], bake_scene: BakeScene | None, collected: SceneContents
+) -> tuple[TurnedFaces, ...]:
+    """Return the faces that warnings of `unlit_scene` name."""
+    sources = [piece.source for piece in collected.pieces if len(piece.mesh)]
+    return () if bake_scene is None else found_faces(warnings, bake_scene.objects, sources)
 
 
 def coincident_warnings(bake_scene: BakeScene | None) -> Iterator[BakeWarning]:

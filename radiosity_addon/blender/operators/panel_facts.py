@@ -15,8 +15,10 @@ from ..overlays.overlay_properties import overlay_of
 from ..relight import kept_bakes
 from ..relight.kept_sidecars import why_not_relit
 from ..scene_records.object_roles import has_role
+from ..session import last_bake
 from ..session.facts import fact
 from ..settings.light_group_properties import ListedGroup, list_groups
+from .checks import last_check
 
 SHOWN_LIGHTS = 16
 
@@ -133,6 +135,29 @@ def kept_lights(context: bpy.types.Context) -> tuple[tuple[LightRow, ...], int]:
         inputs = [each for each in (found.color, found.strength) if each[0] is not None]
         rows.append(LightRow(name, found.icon, tuple(_place(found.block, *each) for each in inputs)))
     return tuple(rows), len(named) - len(rows)
+
+
+class FacesToFlip(NamedTuple):
+    """Objects with faces that show their backs.
+
+    found: Names of those that can be flipped now.
+    changed: Names of those whose mesh has changed since they were found.
+    """
+
+    found: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+
+
+@fact(unknown=(FacesToFlip(), FacesToFlip()))
+def faces_to_flip(context: bpy.types.Context) -> tuple[FacesToFlip, FacesToFlip]:
+    """What the scene's last bake found, and its last check."""
+    from ..apply.face_flips import unchanged
+
+    looked = []
+    for source in (last_bake.read(context.scene), last_check(context.scene)):
+        same, changed = unchanged(source.turned if source is not None else ())
+        looked.append(FacesToFlip(tuple(faces.object for faces in same), tuple(changed)))
+    return looked[0], looked[1]
 
 
 @fact(unknown="")

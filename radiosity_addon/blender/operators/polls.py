@@ -38,8 +38,8 @@ def has_selection(context: bpy.types.Context) -> str:
 
 
 def in_object_mode(context: bpy.types.Context) -> str:
-    """Objects cannot be selected while one is edited."""
-    return "" if context.mode == "OBJECT" else "Objects can only be selected in object mode"
+    """Objects cannot be selected while one is edited, and undo there would only concern its own mesh."""
+    return "" if context.mode == "OBJECT" else "Switch to Object Mode first"
 
 
 def has_light_groups(context: bpy.types.Context) -> str:

@@ -9,7 +9,7 @@ import bpy
 from ...options import ADVANCED, EXPORT, LAST_BAKE, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
 from ..operators.export_operators import is_export_outdated
-from ..operators.panel_facts import can_restore, has_meshes
+from ..operators.panel_facts import can_restore, faces_to_flip, has_meshes
 from ..relight import kept_bakes
 from ..scene_records.object_roles import has_role
 from ..session import last_bake
@@ -17,6 +17,7 @@ from ..session.state import session
 from ..settings.preferences import is_packed
 from ..settings.preset_menu import RADIOSITY_PT_presets
 from .check_panel import CheckSection
+from .face_buttons import draw_face_buttons
 from .light_group_panels import LightGroupSection
 from .object_panel import draw_overrides
 from .option_rows import draw_options
@@ -222,8 +223,9 @@ class WarningsSection(Section):
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
-        """Draw the first warnings."""
+        """Draw the first warnings, and what can be done about some."""
         last = last_bake.read(context.scene) or last_bake.LastBake()
+        draw_face_buttons(layout, faces_to_flip(context)[0], "bake again", context)
         for name, message in last.warnings[:SHOWN_WARNINGS]:
             draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])

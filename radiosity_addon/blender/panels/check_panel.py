@@ -8,7 +8,9 @@ import bpy
 
 from ...base import RadiosityError
 from ..operators.checks import figures, last_check, look
+from ..operators.panel_facts import faces_to_flip
 from ..operators.polls import Conditional, has_scene, no_bake_runs
+from .face_buttons import draw_face_buttons
 from .sections import Section
 from .wrapped_text import draw_text
 
@@ -89,6 +91,7 @@ class CheckSection(Section):
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw figures and findings."""
+        draw_face_buttons(layout, faces_to_flip(context)[1], "bake or check again", context)
         draw_inspection(layout, last_check(context.scene), context, None)
 
 

@@ -136,6 +136,7 @@ def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) ->
                 texel_scale=piece.role.texel_scale,
                 page=piece.role.page,
                 level=level_of_detail(piece),
+                winding=mesh.winding,
             )
         )
         in_bounces.append(np.full(len(mesh), piece.role.in_bounces))

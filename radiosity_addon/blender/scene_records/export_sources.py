@@ -30,6 +30,7 @@ class ExportSource:
         change them. False: they are those of the object's own mesh. Always True for an instance.
     makes_instances: The object also makes instances that became stand-ins.
     glass_slots: Material slots of glass, which gets no lightmap and keeps its material.
+    is_modified: Modifiers or nodes may make other polygons than the object's own mesh has.
     """
 
     name: str
@@ -42,6 +43,7 @@ class ExportSource:
     needs_evaluated_mesh: bool
     makes_instances: bool = False
     glass_slots: frozenset[int] = frozenset()
+    is_modified: bool = False
 
 
 @dataclass(frozen=True)

@@ -138,6 +138,12 @@ def _read_material(material: bpy.types.Material | None) -> bpy.types.Material | 
 def source_of(instance: bpy.types.DepsgraphObjectInstance, name: str, makes_instances: bool) -> ExportSource:
     """Return the record by which what was exported is found again."""
     object_name, library, instancer, persistent_id = identity_of(instance)
+    if instance.is_instance:
+        # Without a look at polygons: there may be thousands.
+        modifiers = original_object(instance).modifiers
+        is_modified = is_generated(instance) or any(modifier.show_render for modifier in modifiers)
+    else:
+        is_modified = _modifiers_change_polygons(instance.object)
     return ExportSource(
         name=name,
         object_name=object_name,
@@ -146,10 +152,9 @@ def source_of(instance: bpy.types.DepsgraphObjectInstance, name: str, makes_inst
         instancer=instancer,
         persistent_id=persistent_id,
         matrix_world=tuple(tuple(float(value) for value in row) for row in instance.matrix_world),
-        needs_evaluated_mesh=instance.is_instance
-        or makes_instances
-        or _modifiers_change_polygons(instance.object),
+        needs_evaluated_mesh=instance.is_instance or makes_instances or is_modified,
         makes_instances=makes_instances,
+        is_modified=is_modified,
     )
 
 

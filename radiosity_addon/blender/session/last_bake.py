@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import bpy
@@ -10,6 +11,7 @@ import bpy
 from ...base import one_of_each
 from ...options import METHODS
 from .state import session
+from .turned_faces import TurnedFaces, from_json, to_json
 
 MEMORY = ("last_bake", "baked_light", "baked_objects", "baked_lights", "baked_content")
 """What a scene remembers of its last bake, by the properties of `scene.radiosity`."""
@@ -27,13 +29,15 @@ class LastBake(NamedTuple):
     warning_count: int = 0
     folder: str = ""
     notes: tuple[str, ...] = ()
+    turned: tuple[TurnedFaces, ...] = ()
+    """Faces that the warnings name."""
 
 
 _parsed: tuple[str, LastBake | None] = "", None
 """The text that was read last, and what it says."""
 
 
-def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
+def remember(scene: bpy.types.Scene, report: dict, folder: str, turned: Sequence[TurnedFaces] = ()) -> None:
     """Keep what the panel shows of a finished bake with the scene.
 
     Parameters
@@ -43,6 +47,8 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
         As it is written to report.json.
     folder : str
         Where the files are; empty if they are packed.
+    turned : sequence of TurnedFaces
+        Faces that its warnings name.
     """
     warnings = one_of_each(report["warnings"])
     scene.radiosity.last_bake = json.dumps(
@@ -55,6 +61,7 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
             "warning_count": len(warnings),
             "notes": [note["message"] for note in one_of_each(report.get("notes", ()))[:MAX_WARNINGS]],
             "folder": folder,
+            "turned": to_json(turned),
         }
     )
 
@@ -115,6 +122,7 @@ def _parse(text: str) -> LastBake | None:
             warning_count=int(record["warning_count"]),
             folder=str(record["folder"]),
             notes=tuple(map(str, record.get("notes", ()))),
+            turned=from_json(record.get("turned", ())),
         )
     except (ValueError, KeyError, TypeError):
         return None
