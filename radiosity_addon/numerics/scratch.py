@@ -119,7 +119,7 @@ class Rows:
         """Return the next `count` rows, uninitialized."""
         start, row = self._count, self._width * self._dtype.itemsize
         self._count += count
-        # Blocks in memory are joined at the end: they briefly exist twice.
+        # Blocks in memory are joined at the end: those whose memory is not freed at once exist twice then.
         size = self._count * row
         if self._file is None and size >= MIN_FILE_BYTES and size + count * row > self._scratch.room():
             self._file = _temporary_file()
@@ -150,7 +150,13 @@ class Rows:
         blocks, self._blocks = self._blocks, []
         shape = (self._count, self._width)
         if self._file is None:
-            joined = np.concatenate(blocks) if blocks else np.empty(shape, self._dtype)
+            # An array takes memory where it is written: with each block that moves over one is freed.
+            joined, end = np.empty(shape, self._dtype), self._count
+            while blocks:
+                block = blocks.pop()
+                joined[end - len(block) : end] = block
+                end -= len(block)
+                del block
             return self._scratch.counted(joined)
         with self._file:
             result = _mapped(self._file, 0, shape, self._dtype)

@@ -34,24 +34,29 @@ class Faces:
         """(f,) int32"""
         self.front = np.arange(len(self.triangle)) < len(solid)
         """(f,) bool"""
-        corners = scene.triangles[self.triangle]
-        corners[~self.front] = corners[~self.front][:, [0, 2, 1]]
+        # A scene of which every front takes part, and no back, is not stored a second time.
+        rows: slice | Array = slice(None) if len(solid) == len(scene) and not len(backs) else self.triangle
+        corners = scene.triangles[rows]
+        if len(backs):
+            corners[len(solid) :] = corners[len(solid) :, [0, 2, 1]]
         self.corners = corners
         """(f, 3, 3) float64, counter-clockwise as seen from the side's own half-space"""
         self.center = corners.mean(axis=1)
         """(f, 3) float64: the centroids [m]"""
-        sign = np.where(self.front, 1.0, -1.0)[:, None]
-        self.normal = scene.face_normals[self.triangle] * sign
+        normal = scene.face_normals[rows]
+        if len(backs):
+            normal[len(solid) :] *= -1.0
+        self.normal = normal
         """(f, 3) float64"""
-        self.area = scene.areas[self.triangle]
+        self.area = scene.areas[rows]
         """(f,) float64 [m²]"""
-        self.reflectance = scene.reflectance[self.triangle]
+        self.reflectance = scene.reflectance[rows]
         """(f, 3) float64"""
-        self.exitance = scene.emission[self.triangle]
+        self.exitance = scene.emission[rows]
         """(f, 3) float64 [W/m²]: what a face emits where nothing covers it"""
         self.emission = self.exitance
         """(f, 3) float64 [W/m²]"""
-        self.opacity = scene.opacity[self.triangle]
+        self.opacity = scene.opacity[rows]
         """(f,) float64: reflectance and emission are already multiplied by it. What other faces cover
         counts as cut out (`layers.py`)"""
         self.own: OwnParts | None = None

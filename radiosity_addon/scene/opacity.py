@@ -29,6 +29,11 @@ from .textures import SurfaceImages
 MOST_LAYERS = 1000
 """A ray that has passed this many surfaces meets no others."""
 
+FAINT, ENDED = 1.0 / 64.0, 1e-5
+"""Where less light than the first share is left, a ray goes on with that share or ends with the second, by
+chance, with as much in the mean (Russian roulette; Arvo and Kirk 1990): through dense foliage it would meet
+all leaves of its way. A share of 0 would say that something opaque is there, and not to ask again."""
+
 
 def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
     """Return the caster for light of a scene's surfaces; its `for_lamps` is the one for light of lamps."""
@@ -165,7 +170,8 @@ class CutOutCaster:
             at, hits = ways.meet()
             opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
             self._multiply(share, ways.ray[at], 1.0 - opacity)
-            ways.keep(share[ways.ray] > 0.0)
+            _thin_out(share, ways.ray[at], origins, directions, hits.triangle)
+            ways.keep(share[ways.ray] > ENDED)
         return share
 
     def passing_colors(
@@ -180,7 +186,8 @@ class CutOutCaster:
             at, hits = ways.meet()
             passes = self._images.passes_at(hits.triangle, hits.barycentric)
             self._multiply(share, ways.ray[at], np.clip(passes, least, 1.0 - least))
-            ways.keep(share[ways.ray].any(axis=1))
+            _thin_out(share, ways.ray[at], origins, directions, hits.triangle)
+            ways.keep(share[ways.ray].max(axis=1, initial=0.0) > ENDED)
         return share
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
@@ -328,6 +335,21 @@ class _Ways:
     def keep(self, going: Array) -> None:
         """Go on with the rays of a mask."""
         self.ray, self._gone, self._last = self.ray[going], self._gone[going], self._last[going]
+
+
+def _thin_out(share: Array, ray: Array, origins: Array, directions: Array, triangle: Array) -> None:
+    """Decide which rays (h,) that have met triangles (h,) go on though their share is faint, in place.
+
+    share (n,) or (n, 3): The largest channel decides for all.
+    """
+    left = share[ray] if share.ndim == 1 else share[ray].max(axis=1, initial=0.0)
+    rows = np.flatnonzero((left < FAINT) & (left > ENDED))
+    # Where cut-outs coincide, the first of them decides.
+    rows = rows[np.unique(ray[rows], return_index=True)[1]]
+    faint, left = ray[rows], left[rows]
+    drawn = _drawn(origins[faint], directions[faint], triangle[rows])
+    becomes = np.where(drawn < (left - ENDED) / (FAINT - ENDED), FAINT, ENDED)
+    share[faint] = (share[faint].T * (becomes / left)).T
 
 
 def _drawn(origins: Array, directions: Array, triangle: Array) -> Array:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.rays.caster import NO_HIT, BruteForceCaster
+from radiosity_addon.rays.caster import NO_HIT, BruteForceCaster, Hits
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.scene.opacity import CutOutCaster, ray_caster
+from radiosity_addon.scene.opacity import ENDED, FAINT, CutOutCaster, ray_caster
 from radiosity_addon.scene.textures import SurfaceImages
 from tests.rooms import gray_scene, rectangle
 from tests.textured_rooms import image
@@ -120,6 +120,37 @@ def test_veils_multiply() -> None:
     assert (layer == 0).mean() == pytest.approx(left, abs=0.01)
     hinted = cast.passing(origins, directions, to_floor, 1e-3)
     np.testing.assert_allclose(hinted, through * (1 - 1e-3), rtol=1e-5)
+
+
+def test_faint_light_goes_on_by_chance() -> None:
+    """Behind forty veils: as much light in the mean, for a fraction of the work."""
+    count, opacity = 40, 0.3
+    triangles, images = stack(np.full((count, 4, 4), opacity))
+    triangles = triangles * (1, 1, LAYERS / count)
+    meetings: list[int] = []
+
+    class Counted(EmbreeCaster):
+        def intersect(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+            meetings.append(len(origins))
+            return super().intersect(origins, directions)
+
+    cast = CutOutCaster(triangles, images)
+    cast._cut.__class__ = Counted
+    origins, directions = downward(100_000)
+    to_floor = (LAYERS + 0.9) / -directions[:, 2]
+    passed = cast.passing(origins, directions, to_floor)
+    through = (1 - opacity) ** count
+    assert sum(meetings) < 0.4 * count * len(origins)
+    # Each has come to its end on the way, or has about as much as it goes on with.
+    assert passed.max() <= FAINT * 1.0001
+    assert (np.isclose(passed, ENDED) | (passed > FAINT * (1 - opacity) * 0.999)).all()
+    off = 4 * passed.std() / np.sqrt(len(passed))
+    assert -off < passed.mean() - through < ENDED + off
+    halfway = np.full(len(origins), 0.5 * LAYERS + 0.9)
+    ahead = cast.passing(origins, np.broadcast_to((0.0, 0.0, -1.0), origins.shape), halfway)
+    expected = (1 - opacity) ** (count // 2)
+    assert ahead.mean() == pytest.approx(expected, abs=ENDED + 4 * ahead.std() / np.sqrt(len(ahead)))
+    assert ahead.mean() == pytest.approx(expected, rel=0.1)
 
 
 def test_rays_are_stopped_alike_however_they_are_divided() -> None:

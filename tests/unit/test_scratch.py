@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,8 @@ from radiosity_addon.numerics.scratch import MIN_FILE_BYTES, Scratch, is_in_file
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.cornell import cornell_box
 from tests.unit.texel_scenes import bake_scene
+
+ROOT = Path(__file__).resolve().parents[2]
 
 COUNT = MIN_FILE_BYTES // 4
 """Numbers of four bytes that are just counted."""
@@ -59,6 +63,38 @@ def test_rows_are_the_same_wherever_they_are(budget: float) -> None:
     found = table.all()
     assert is_in_file(found) == (budget < np.inf)
     np.testing.assert_array_equal(found, expected)
+
+
+JOINED = """
+import os
+from radiosity_addon.numerics.scratch import Scratch
+
+def held(key):
+    try:
+        return int(open("/proc/self/status").read().split(key)[1].split()[0]) / 2**10
+    except OSError:
+        os._exit(3)
+
+table = Scratch().rows(1 << 10, "i4")
+for _ in range(64):
+    table.more(1 << 10)[:] = 1
+before = held("VmRSS:")
+joined = table.all()
+print(joined.nbytes / 2**20, held("VmHWM:") - before, held("VmRSS:") - before, flush=True)
+os._exit(0)
+"""
+
+
+def test_rows_are_joined_without_a_second_copy() -> None:
+    """256 MiB in blocks of 4: each is freed once it has moved."""
+    run = subprocess.run([sys.executable, "-c", JOINED], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    if run.returncode == 3:
+        pytest.skip("this system does not say how much memory a process takes")
+    assert run.returncode == 0, run.stderr
+    size, more, in_the_end = (float(word) for word in run.stdout.split())
+    assert size == 256
+    assert in_the_end < 16
+    assert more < 32
 
 
 def test_a_full_disk_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -147,11 +147,12 @@ class LightSoFar:
             mean[rows] = (seen if gathered.tints is None else seen * gathered.tints[rows, ::EVERY]).mean(
                 axis=1
             )
-        if len(aimed.row):
-            seen = self._values_at(aimed.sources)
-            seen[aimed.sources < 0] = 0.0
-            weights = aimed.weights
-            mean[aimed.row] += np.einsum("akc,ak->ac" if weights.ndim == 2 else "akc,akc->ac", seen, weights)
+        for rows in tiles(len(aimed.row), CHUNK):
+            sources, weights = aimed.sources[rows], aimed.weights[rows]
+            seen = self._values_at(sources)
+            seen[sources < 0] = 0.0
+            brought = np.einsum("akc,ak->ac" if weights.ndim == 2 else "akc,akc->ac", seen, weights)
+            mean[aimed.row[rows]] += brought
         return np.asarray(mean)
 
     def _values_at(self, sources: Array) -> Array:

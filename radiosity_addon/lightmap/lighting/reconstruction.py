@@ -18,9 +18,9 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, tiles
+from ...numerics import Array, give_back, tiles
 from ...scene import Scene
-from ...solver.gather import Footprints, LightGains, LocalPass, values_of
+from ...solver.gather import Footprints, LightGains, LocalPass
 from ..points import alike_neighbors
 from ..texels import SmoothLift, TexelGeometry, find_crossings, texel_materials, uneven_texels
 from ..transport import (
@@ -90,7 +90,9 @@ def light_texels(
     lamps = geometry.scratch.zeros((len(geometry), 3))
     if so_far is not None:
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
+    del emission
     gains = _direct_light(local, geometry, previous, lamps, so_far, progress.part(0.0, DIRECT))
+    _give_back(geometry)
     more = None if previous is None else lamps - local.direct.lit_by(previous.lit.gains)
     if more is not None:
         local = _brightened(local, element, more)
@@ -103,6 +105,7 @@ def light_texels(
         progress=progress.part(DIRECT, CROSSED),
     )
     table = HitTable(local, geometry, crossings, uneven_texels(geometry, lamps))
+    _give_back(geometry)
     standing = None if previous is None else StandingHits(previous, table)
     turns = iter([progress.part(CROSSED, 1.0)])
     if more_rays is not None:
@@ -115,6 +118,7 @@ def light_texels(
     else:
         start, transport = standing.start(transport, rows, element, more)
     alike = alike_neighbors(geometry, local.caster, crossings.alone, local.threads)
+    _give_back(geometry)
     while True:
         light = sweep(
             transport,
@@ -152,6 +156,12 @@ def light_texels(
     )
     bright = local.gather.bright if standing is None else standing.bright
     return replace(light, kept=lit, traced=LightingRecord(settings, table, layout, rows, bright, error))
+
+
+def _give_back(geometry: TexelGeometry) -> None:
+    """Give back what a step freed, unless memory is short: the budget counts it as used by the next one."""
+    if not geometry.scratch.in_files:
+        give_back()
 
 
 def _direct_light(
@@ -198,6 +208,7 @@ def _trace(
         table.local, table.crossings, settings, table.number, values, kept, met, gathering
     )
     del kept
+    _give_back(table.geometry)
     if standing is not None:
         known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)
@@ -207,9 +218,9 @@ def _trace(
 
 def _hierarchy_start(local: LocalPass, element: Array, geometry: TexelGeometry) -> Array:
     """Return (n, 3) float32 what texels reflect by the hierarchy's light [W/m²]."""
-    start, reflected = geometry.scratch.empty((len(element), 3), np.float32), local.elements.reflected()
+    start = geometry.scratch.empty((len(element), 3), np.float32)
     for tile in tiles(len(element)):
-        start[tile] = values_of(reflected, element[tile])
+        start[tile] = local.elements.reflected_of(element[tile])
     return start
 
 

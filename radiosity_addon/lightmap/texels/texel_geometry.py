@@ -178,7 +178,7 @@ class TexelGeometry:
     @property
     def reach(self) -> Array:
         """(n,) float64: no point of a texel is farther from another one of it [m]."""
-        across, up = self._texel_edges
+        across, up = self._texel_edges(slice(None))
         reach = np.asarray((np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1))[self.triangle])
         if self.shared is not None:
             rows, shared = np.flatnonzero(self.shared.number >= 0), self.shared
@@ -258,18 +258,20 @@ class TexelGeometry:
         """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
         triangle = self.triangle[rows]
         start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]
-        across, up = self._texel_edges
-        points = spots[..., :1] * across[triangle, None]
-        points += spots[..., 1:] * up[triangle, None]
+        across, up = self._texel_edges(triangle)
+        points = spots[..., :1] * across[:, None]
+        points += spots[..., 1:] * up[:, None]
         first = self._scene.triangles[triangle, 0]
-        points += (first + start[:, :1] * across[triangle] + start[:, 1:] * up[triangle])[:, None]
+        points += (first + start[:, :1] * across + start[:, 1:] * up)[:, None]
         return np.asarray(points)
 
-    @cached_property
-    def _texel_edges(self) -> tuple[Array, Array]:
-        """(t, 3) float64 twice: the way to the next texel of the row, and of the column; 0 without area."""
-        edges = self._scene.triangles[:, 1:] - self._scene.triangles[:, :1]
-        place = self._places.astype(np.float64)
+    def _texel_edges(self, triangle: Array | slice) -> tuple[Array, Array]:
+        """Return (r, 3) twice: the way to a triangle's next texel of the row, of the column; 0 without area.
+
+        Not stored: of a million triangles they take 46 MB.
+        """
+        edges = self._scene.triangles[triangle, 1:] - self._scene.triangles[triangle, :1]
+        place = self._places[triangle].astype(np.float64)
         first, second = place[:, 2:4], place[:, 4:6]
         whole = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
         part = np.where(whole == 0.0, 0.0, 1.0 / np.where(whole == 0.0, 1.0, whole))[:, None]

@@ -207,11 +207,14 @@ def gather_texels(
             if len(start):
                 variance = np.append(variance, np.add.reduceat(of_runs, start) / count)
         points.add(stride, *runs.points(lists))
+    del found, variance
     if kept is None:
         spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     else:
         spread = kept.refitted(points, geometry)
-    return runs.all(spread, points.level, points.farthest)
+    level_of_point, farthest = points.level, points.farthest
+    del points  # its pairs take as much as those of `spread`
+    return runs.all(spread, level_of_point, farthest)
 
 
 def gather_more(

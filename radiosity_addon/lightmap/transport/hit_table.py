@@ -15,7 +15,7 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
-from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass, values_of
+from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood
 
 WIDE_TEXEL = 4.0
@@ -125,7 +125,7 @@ class HitTable:
         below (n,): The leaf elements below the texels, or NOTHING.
         """
         elements, flat = self.local.elements, numbers.ravel()
-        values = values_of(elements.reflected(), self.elements_of(flat, below))
+        values = elements.reflected_of(self.elements_of(flat, below))
         values[flat < 0] = elements.beyond()[flat[flat < 0]]
         return np.asarray(values.reshape(*numbers.shape, 3))
 

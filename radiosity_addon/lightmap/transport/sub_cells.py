@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, across, marked, tiles
-from ...solver.gather import LightGains, values_of
+from ...solver.gather import LightGains
 from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
 from .source_means import SourceMeans
@@ -165,9 +165,9 @@ def gather_sub_cells(
         rows.to_rows(sources)
     number = np.concatenate([np.arange(table.texel_count, table.first_small), small])
     element = table.elements_of(number, below)
-    start, reflected = table.geometry.scratch.empty((len(element), 3)), table.local.elements.reflected()
+    start = table.geometry.scratch.empty((len(element), 3))
     for tile in tiles(len(element)):
-        start[tile] = values_of(reflected, element[tile])
+        start[tile] = table.local.elements.reflected_of(element[tile])
     return SubCells(start, made, element), rows
 
 

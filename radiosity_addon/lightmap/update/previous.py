@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...numerics import Array
-from ...solver.gather import LocalPass, values_of
+from ...solver.gather import LocalPass
 from ..transport import GatherLinks, HitTable, LightingRecord, RelightableTexels, TableRows, TexelTransport
 from .affected import AffectedTexels
 
@@ -64,7 +64,7 @@ class StandingHits:
         (n, 3) [W/m²].
         """
         cells, count = transport.cells, len(element)
-        start = values_of(self.table.local.elements.reflected(), np.concatenate([element, cells.element]))
+        start = self.table.local.elements.reflected_of(np.concatenate([element, cells.element]))
         number = self.numbers(np.arange(len(self.previous.traced.rows)))
         stands = number >= 0
         place = np.full(self.table.end, -1)

@@ -89,6 +89,14 @@ class ElementLookup:
         arriving = self.irradiance if irradiance is None else irradiance
         return np.asarray(self.reflectance_of(np.arange(self.hierarchy.n_elements)) * arriving)
 
+    def reflected_of(self, elements: Array) -> Array:
+        """Return (n, 3) the same of some elements alone; 0 at NOTHING [W/m²]."""
+        found = np.zeros((len(elements), 3))
+        there = elements != NOTHING
+        asked = elements[there]
+        found[there] = self.reflectance_of(asked) * self.irradiance[asked]
+        return found
+
     def reflectance_of(self, elements: Array) -> Array:
         """Return (k, 3) the reflectance of elements where their surface is there."""
         hierarchy = self.hierarchy

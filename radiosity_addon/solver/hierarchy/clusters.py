@@ -87,6 +87,11 @@ class Clusters:
             self.upper[last, axis] = np.maximum(self.upper[last, axis], upper[-1])
         self._measure_cones(faces)
 
+    def forget_shapes(self) -> None:
+        """Free what only decides which links there are: once these are made, nothing asks for it."""
+        self.lower = self.upper = self.normal = np.zeros((0, 3))
+        self.cone = np.zeros(0)
+
     def _measure_cones(self, faces: Faces) -> None:
         """Bound the normals of every cluster by a cone about their mean, from the children's up."""
         count = len(self)

@@ -157,6 +157,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
     add_details(state, rounds)
+    hierarchy.clusters.forget_shapes()
     if state.cut is not None:
         state.cut.kept = None  # as large as the links, and quickly made again
     return state
