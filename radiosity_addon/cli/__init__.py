@@ -7,7 +7,14 @@ from __future__ import annotations
 
 from .console import Console, summary
 from .interrupts import Interrupts
-from .parser import bake_output, build_parser, check_keeping, check_plot, requested_settings
+from .parser import (
+    bake_output,
+    build_parser,
+    check_keeping,
+    check_plot,
+    check_sharing,
+    requested_settings,
+)
 from .path_checks import check_folder, printable
 from .permissions import Permissions
 from .temporary_folder import TemporaryFolder
@@ -22,6 +29,7 @@ __all__ = [
     "check_folder",
     "check_keeping",
     "check_plot",
+    "check_sharing",
     "printable",
     "requested_settings",
     "summary",

@@ -70,10 +70,15 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
         raise UsageError("--keep: a residual is of all light together; bake another quantity")
     if request.relight and request.plot is not None:
         raise UsageError("--relight solves nothing, so --plot has no history to draw")
-    if request.relight and request.spool is not None:
-        raise UsageError("--relight traces no rays, so there is nothing to share: leave --spool out")
     if request.relight and request.check:
         raise UsageError("--check looks at a bake, not at --relight: give one of the two")
+
+
+def check_sharing(request: argparse.Namespace) -> None:
+    """Refuse to share what traces no rays."""
+    for flag, given in (("--relight", request.relight), ("--check", request.check)):
+        if given and request.spool is not None:
+            raise UsageError(f"{flag} traces no rays, so there is nothing to share: leave --spool out")
 
 
 def check_plot(plot: Path | None) -> None:

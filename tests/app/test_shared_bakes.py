@@ -207,8 +207,11 @@ def test_a_folder_of_other_things_is_refused_before_the_bake(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["thesis.txt"]
 
 
-def test_relighting_has_nothing_to_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["bake", "--relight", "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
+@pytest.mark.parametrize("flag", ["--relight", "--check"])
+def test_what_traces_no_rays_has_nothing_to_share(
+    flag: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["bake", flag, "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
     assert main(words) == 2
     assert "leave --spool out" in capsys.readouterr().err
     assert not (tmp_path / "spool").exists()

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from radiosity_addon.blender.apply.restore import restore_scene
 from radiosity_addon.blender.operators.panel_facts import FacesToFlip, faces_to_flip
@@ -167,16 +168,36 @@ def test_faces_are_known_after_the_file_was_saved_and_opened(tmp_path: Path) -> 
     assert facing(bpy.data.objects["Boxes"]) == [1] * 12
 
 
-def test_an_edited_mesh_is_left_alone() -> None:
-    """Its polygons may have other numbers now. Moving vertices is no such edit."""
+@pytest.mark.parametrize("edit", ["flipped", "moved vertex", "turned", "replaced"])
+def test_an_object_that_was_edited_is_left_alone(edit: str) -> None:
+    """Its faces may have other numbers, or face elsewhere. To move it is no such edit."""
     boxes, other = two_boxes(), box("Other", x=-5)
     bake()
-    boxes.data.flip_normals()
-    other.data.vertices[0].co.x -= 0.1
+    other.location.y += 2.0
+    if edit == "flipped":
+        boxes.data.flip_normals()
+    elif edit == "moved vertex":
+        boxes.data.vertices[0].co.x -= 0.1
+    elif edit == "turned":
+        boxes.rotation_euler.z = np.pi
+    else:
+        # Of the same name and order of corners, and mirrored, so that all of it is right.
+        mesh = boxes.data.copy()
+        mesh.transform(Matrix.Scale(-1.0, 4, (1.0, 0.0, 0.0)))
+        bpy.data.objects.remove(boxes)
+        boxes = bpy.data.objects.new("Boxes", mesh)
+        bpy.context.collection.objects.link(boxes)
+    bpy.context.view_layer.update()
+    before = facing(boxes)
     assert faces_to_flip(bpy.context)[0] == FacesToFlip(("Other",), ("Boxes",))
     flip()
-    assert facing(boxes) == [-1] * 6 + [1] * 6
+    assert facing(boxes) == before
     assert facing(other) == [1] * 6
+
+
+def test_objects_that_are_gone_or_renamed_are_not_asked_for() -> None:
+    boxes, other = two_boxes(), box("Other", x=-5)
+    bake()
     bpy.data.objects.remove(other)
     boxes.name = "Renamed"
     assert faces_to_flip(bpy.context)[0] == FacesToFlip()

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.datablocks.face_winding import flip_polygons, select_polygons, winding_digest
+from radiosity_addon.blender.datablocks.face_winding import flip_polygons, select_polygons, shape_digest
 from radiosity_addon.blender.stand_ins.mesh_digest import digest_of_mesh
 
 SOME = [0, 1, 2, 5, 11, 30]
@@ -80,7 +80,7 @@ def signed(mesh: bpy.types.Mesh, flipped: list[int]) -> list[dict[int, tuple[flo
 
 def test_chosen_polygons_face_the_other_way_and_nothing_else_changes() -> None:
     mesh = full_mesh()
-    digest, winding, before = digest_of_mesh(mesh), winding_digest(mesh), layers(mesh)
+    digest, winding, before = digest_of_mesh(mesh), shape_digest(mesh), layers(mesh)
     faces = np.array([polygon.normal for polygon in mesh.polygons])
     order = [tuple(polygon.vertices) for polygon in mesh.polygons]
     active = mesh.uv_layers.active.name, [layer.active_render for layer in mesh.uv_layers]
@@ -94,11 +94,11 @@ def test_chosen_polygons_face_the_other_way_and_nothing_else_changes() -> None:
     ] == [True] * len(order)
     assert layers(mesh) == before
     assert (mesh.uv_layers.active.name, [layer.active_render for layer in mesh.uv_layers]) == active
-    assert winding_digest(mesh) != winding
+    assert shape_digest(mesh) != winding
     assert not mesh.validate()
     # All that can be edited of a mesh is in its digest.
     flip_polygons(mesh, SOME)
-    assert (digest_of_mesh(mesh), winding_digest(mesh)) == (digest, winding)
+    assert (digest_of_mesh(mesh), shape_digest(mesh)) == (digest, winding)
 
 
 @pytest.mark.parametrize("flipped", [SOME, list(range(40))])

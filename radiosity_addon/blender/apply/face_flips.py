@@ -14,7 +14,7 @@ from ...base import BakeWarning
 from ...scene import BakeObject
 from ..datablocks.bake_record import is_made
 from ..datablocks.edit_modes import leave_edit_modes
-from ..datablocks.face_winding import flip_polygons, winding_digest
+from ..datablocks.face_winding import flip_polygons, shape_digest
 from ..material_copies.material_slots import original_of
 from ..scene_records.export_sources import ExportSource
 from ..session.turned_faces import TurnedFaces, runs_of
@@ -79,25 +79,33 @@ def found_faces(
                 is_whole=len(polygons) == len(set(item.polygon.tolist())),
                 is_made=any(source.is_modified for _, source in places),
                 is_right_elsewhere=not everywhere,
-                winding=winding_digest(mesh) if isinstance(mesh, bpy.types.Mesh) else "",
+                shape=_shape_of(obj, mesh),
             )
         )
     return tuple(found)
 
 
 def unchanged(found: Iterable[TurnedFaces]) -> tuple[list[TurnedFaces], list[str]]:
-    """Return those of objects whose mesh is as it was, and the names of objects whose mesh is not."""
+    """Return those of objects that are as they were, wherever they are, and the names of the others."""
     same, changed = [], []
     for faces in found:
         obj = bpy.data.objects.get((faces.object, None))
         mesh = None if obj is None else own_mesh(obj)
         if mesh is None:
             continue
-        if faces.winding == (winding_digest(mesh) if isinstance(mesh, bpy.types.Mesh) else ""):
+        if faces.shape == _shape_of(obj, mesh):
             same.append(faces)
         else:
             changed.append(faces.object)
     return same, changed
+
+
+def _shape_of(obj: bpy.types.Object, mesh: bpy.types.ID | None) -> str:
+    """Return a digest of an object's mesh and of how it is turned; another one faces elsewhere."""
+    if not isinstance(mesh, bpy.types.Mesh):
+        return ""
+    turned = " ".join(f"{round(value, 5) + 0.0:g}" for row in obj.matrix_world.to_3x3() for value in row)
+    return f"{shape_digest(mesh)} {turned}"
 
 
 def flip(context: bpy.types.Context, found: Sequence[TurnedFaces], chosen: Sequence[str]) -> Flipped:

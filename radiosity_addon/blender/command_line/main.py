@@ -22,6 +22,7 @@ from ...cli import (
     build_parser,
     check_keeping,
     check_plot,
+    check_sharing,
     printable,
     requested_settings,
 )
@@ -53,6 +54,8 @@ def main(
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
         settings = requested_settings(request) if request.verb == "bake" else None
+        if settings is not None:
+            check_sharing(request)
         if settings is not None and not request.check:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)

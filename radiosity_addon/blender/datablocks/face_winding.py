@@ -18,16 +18,18 @@ CUSTOM_NORMAL = "custom_normal"
 vectors."""
 
 
-def winding_digest(mesh: bpy.types.Mesh) -> str:
-    """Return a digest of a mesh's polygons and the order of their corners, wherever vertices are."""
+def shape_digest(mesh: bpy.types.Mesh) -> str:
+    """Return a digest of a mesh's polygons, the order of their corners, and where vertices are."""
     starts = np.empty(len(mesh.polygons), dtype=np.int32)
-    corners = np.zeros(len(mesh.loops), dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", starts)
-    around = mesh.attributes.get(".corner_vert")  # read a hundred times as fast as through `loops`
-    if around is not None:
-        around.data.foreach_get("value", corners)
     found = hashlib.blake2b(starts.tobytes(), digest_size=16)
-    found.update(corners.tobytes())
+    # Attributes are read a hundred times as fast as loops and vertices.
+    for name, key, width in ((".corner_vert", "value", 1), ("position", "vector", 3)):
+        attribute = mesh.attributes.get(name)
+        if attribute is not None:
+            values = np.empty(width * len(attribute.data), dtype=np.int32 if width == 1 else np.float32)
+            attribute.data.foreach_get(key, values)
+            found.update(values.tobytes())
     return found.hexdigest()
 
 

@@ -14,7 +14,7 @@ class TurnedFaces(NamedTuple):
     is_whole: All of its polygons.
     is_made: Modifiers make its polygons, so that the mesh has others.
     is_right_elsewhere: An instance of the object shows other polygons, or none, from behind.
-    winding: Digest of its own mesh (`face_winding.py`): polygons count only while the mesh is as it was.
+    shape: Digest of its own mesh and of how it is turned: polygons count only while both are as they were.
     """
 
     object: str
@@ -22,7 +22,7 @@ class TurnedFaces(NamedTuple):
     is_whole: bool
     is_made: bool
     is_right_elsewhere: bool
-    winding: str
+    shape: str
 
     @property
     def polygons(self) -> list[int]:
@@ -52,11 +52,11 @@ def from_json(stored: Iterable[Any]) -> tuple[TurnedFaces, ...]:
     Raises ValueError, TypeError for what somebody else did.
     """
     found = []
-    for name, runs, is_whole, is_made, is_right_elsewhere, winding in stored:
+    for name, runs, is_whole, is_made, is_right_elsewhere, shape in stored:
         numbers = tuple((int(first), int(last)) for first, last in runs)
         found.append(
             TurnedFaces(
-                str(name), numbers, bool(is_whole), bool(is_made), bool(is_right_elsewhere), str(winding)
+                str(name), numbers, bool(is_whole), bool(is_made), bool(is_right_elsewhere), str(shape)
             )
         )
     return tuple(found)
