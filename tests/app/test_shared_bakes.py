@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,9 +34,23 @@ ROOMS = {"room": room, "glass": glazed_room}
 BAKE = """
 import sys
 from pathlib import Path
-from radiosity_addon.farm import Spool, shared_bake
-from tests.app.test_shared_bakes import baked_bytes, ROOMS
-print(baked_bytes(ROOMS[sys.argv[2]](), Path(sys.argv[1])))
+from tests.app.test_shared_bakes import baked_bytes, ends_after, waits_for_a_worker, ROOMS
+spool, name, kernel, results = sys.argv[1:]
+if kernel:
+    waits_for_a_worker(kernel)
+if int(results):
+    ends_after(int(results))
+print(baked_bytes(ROOMS[name](), Path(spool)))
+"""
+
+DYING_WORKER = """
+import sys
+from pathlib import Path
+from radiosity_addon.farm.__main__ import main
+from tests.app.test_shared_bakes import dies_with_a_task_of
+spool, kernel = sys.argv[1:]
+dies_with_a_task_of(kernel)
+main(["worker", spool, "--idle", "60"])
 """
 
 
@@ -57,15 +73,21 @@ def alone(name: str) -> str:
 
 
 @pytest.fixture
-def workers(tmp_path: Path) -> Iterator[Callable[[], subprocess.Popen[str]]]:
-    """Starts workers of `tmp_path / "spool"`, as soon as it exists."""
+def workers(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts workers of `tmp_path / "spool"`, as soon as it exists; one that dies if told at which kernel."""
     with ExitStack() as stack:
 
-        def start() -> subprocess.Popen[str]:
-            until((tmp_path / "spool" / "spool.json").exists)
-            words = [sys.executable, "-m", "radiosity_addon.farm", "worker", str(tmp_path / "spool")]
+        def start(dies_at: str = "") -> subprocess.Popen[str]:
+            spool = tmp_path / "spool"
+            until((spool / "spool.json").exists)
+            usual = ["-m", "radiosity_addon.farm", "worker", spool, "--idle", "60"]
+            words = ["-c", DYING_WORKER, spool, dies_at] if dies_at else usual
             worker = subprocess.Popen(
-                [*words, "--idle", "60"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                [sys.executable, *map(str, words)],
+                cwd=ROOT,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
             )
             stack.callback(worker.wait)
             stack.callback(worker.kill)
@@ -74,10 +96,59 @@ def workers(tmp_path: Path) -> Iterator[Callable[[], subprocess.Popen[str]]]:
         yield start
 
 
-def start_bake(spool: Path, name: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-c", BAKE, str(spool), name], cwd=ROOT, stdout=subprocess.PIPE, text=True
-    )
+def start_bake(spool: Path, name: str, kernel: str = "", results: int = 0) -> subprocess.Popen[str]:
+    """Bake a room in a process of its own.
+
+    kernel: One whose first call is left to workers until one of them has claimed a task.
+    results: The number of results after which the process is killed; 0 for never.
+    """
+    words = [sys.executable, "-c", BAKE, str(spool), name, kernel, str(results)]
+    return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+
+
+def waits_for_a_worker(kernel: str = "") -> None:
+    """Have bakes of this process leave their first call of a kernel to workers, until one has claimed a task.
+
+    kernel: Any kernel if empty.
+    """
+    put_call, waited = Spool.put_call, False
+
+    def put_and_wait(self: Spool, text: str) -> str:
+        nonlocal waited
+        digest = put_call(self, text)
+        if not waited and kernel in text:
+            until(lambda: self.claimed(digest) | self.done(digest))
+            waited = True
+        return digest
+
+    Spool.put_call = put_and_wait  # type: ignore[method-assign]
+
+
+def ends_after(results: int) -> None:
+    """Have this process killed when it has written so many results."""
+    put_result, count = Spool.put_result, 0
+
+    def put_and_die(self: Spool, *found: Any) -> None:
+        nonlocal count
+        put_result(self, *found)
+        count += 1
+        if count == results:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    Spool.put_result = put_and_die  # type: ignore[method-assign]
+
+
+def dies_with_a_task_of(kernel: str) -> None:
+    """Have this process killed as soon as it has claimed a task of a kernel."""
+    claim = Spool.claim
+
+    def claim_and_die(self: Spool, digest: str, task: int) -> bool:
+        claimed = claim(self, digest, task)
+        if claimed and kernel in json.dumps(self.call(digest)):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return claimed
+
+    Spool.claim = claim_and_die  # type: ignore[method-assign]
 
 
 def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
@@ -89,10 +160,18 @@ def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 3])
 def test_any_number_of_workers_gives_the_same_bytes(
-    count: int, name: str, alone: str, tmp_path: Path, workers: Callable[[], subprocess.Popen[str]]
+    count: int,
+    name: str,
+    alone: str,
+    tmp_path: Path,
+    workers: Callable[[], subprocess.Popen[str]],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     Spool.to_bake(tmp_path / "spool")
     helping = [workers() for _ in range(count)]
+    if count:
+        monkeypatch.setattr(Spool, "put_call", Spool.put_call)
+        waits_for_a_worker()
     assert baked_bytes(ROOMS[name](), tmp_path / "spool") == alone
     done = [worker.communicate(timeout=60) for worker in helping]
     assert all(worker.returncode == 0 for worker in helping), done
@@ -107,36 +186,17 @@ def test_any_number_of_workers_gives_the_same_bytes(
     "kernel", ["solver.gather.soft_shadows:_shadowed", "solver.gather.final_gather:_trace"]
 )
 def test_a_worker_that_is_killed_costs_its_task_alone(
-    kernel: str, name: str, alone: str, tmp_path: Path, workers: Callable[[], subprocess.Popen[str]]
+    kernel: str, name: str, alone: str, tmp_path: Path, workers: Callable[[str], subprocess.Popen[str]]
 ) -> None:
-    baking = start_bake(tmp_path / "spool", name)
-    worker = workers()
-
-    def is_at_it() -> bool:
-        assert baking.poll() is None
-        return any(
-            f'"{kernel}"' in call.read_text() and who(call.parent, worker.pid)
-            for call in (tmp_path / "spool" / "calls").glob("*/call.json")
-        )
-
-    until(is_at_it)
-    os.kill(worker.pid, signal.SIGKILL)
+    baking = start_bake(tmp_path / "spool", name, kernel)
+    assert workers(kernel).wait(timeout=120) == -signal.SIGKILL
     assert baking.communicate(timeout=120)[0].strip() == alone
-
-
-def who(call: Path, pid: int) -> bool:
-    """Return whether a process has claimed a task of a call."""
-    claims = (claim.read_text().split() for claim in call.glob("*.claim"))
-    return any(words and words[-1] == str(pid) for words in claims)
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal here")
 def test_a_bake_that_is_killed_goes_on_where_it_was(name: str, alone: str, tmp_path: Path) -> None:
     spool = tmp_path / "spool"
-    baking = start_bake(spool, name)
-    until(lambda: len(list(spool.glob("calls/*/*.result"))) > 12)
-    baking.kill()
-    baking.wait()
+    assert start_bake(spool, name, results=12).wait(timeout=120) == -signal.SIGKILL
     before = {path: path.stat().st_mtime_ns for path in spool.glob("calls/*/*.result")}
     # What is damaged meanwhile is done again, and nothing else.
     truncated, flipped = sorted(before)[:2]
