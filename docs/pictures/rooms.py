@@ -26,6 +26,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
+
 from .rooms_table import AFTER, BEFORE, COSTS, costs_of, write_table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -91,15 +93,26 @@ class Room:
 
 ROOMS = (
     Room("classroom", "classroom/classroom-matte.blend", detail=(300, 30)),
-    Room("staircase", "staircase/staircase.blend", size=(720, 1280), flipped=True),
-    Room("sponza", "sponza/sponza.blend", ((9.0, -5.3, 1.7), (-4.0, -3.0, 2.8), 20.0), exposure=1.0),
+    Room("staircase", "staircase/staircase.blend", size=(540, 960), detail=(110, 330), flipped=True),
     Room(
-        "platformer", "platformer/platformer.blend", ((3.0, -6.0, 1.6), (-3.0, 4.0, 1.0), 22.0), exposure=-2.0
+        "sponza",
+        "sponza/sponza.blend",
+        ((9.0, -5.3, 1.7), (-4.0, -3.0, 2.8), 20.0),
+        detail=(40, 20),
+        exposure=1.0,
+    ),
+    Room(
+        "platformer",
+        "platformer/platformer.blend",
+        ((3.0, -6.0, 1.6), (-3.0, 4.0, 1.0), 22.0),
+        detail=(130, 200),
+        exposure=-2.0,
     ),
     Room(
         "game-map",
         "game-map/zdm2.obj",
         ((-222.0, -95.0, 82.0), (-100.0, -140.0, 95.0), 18.0),
+        detail=(320, 190),
         exposure=0.2,
         sky=1.0,
     ),
@@ -214,6 +227,35 @@ def bake(folder: Path, room: Room, when: str, checkout: Path) -> None:
     (output / "cost.json").write_text(json.dumps(cost, indent=1) + "\n", encoding="utf-8")
 
 
+def count_texels(output: Path) -> dict[str, float]:
+    """Return the shares of texels whose center is on a surface, without and with shared ones.
+
+    Reports of old versions also count texels of which a surface touches only a corner.
+    """
+    import bpy
+    import numpy as np
+
+    from radiosity_addon.lightmap.texels import rasterize
+
+    bpy.ops.wm.open_mainfile(filepath=str(output / "baked.blend"))
+    parts = []
+    for obj in bpy.context.scene.objects:
+        if obj.type == "MESH" and LIGHTMAP_UV_LAYER in obj.data.uv_layers and not obj.hide_render:
+            mesh = obj.data
+            mesh.calc_loop_triangles()
+            corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+            mesh.loop_triangles.foreach_get("loops", corners)
+            uv = np.empty(2 * len(mesh.loops), dtype=np.float32)
+            mesh.uv_layers[LIGHTMAP_UV_LAYER].uv.foreach_get("vector", uv)
+            parts.append(uv.reshape(-1, 2)[corners].reshape(-1, 3, 2))
+    texels = rasterize(np.concatenate(parts), RESOLUTION)
+    report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+    touched = len(np.unique(RESOLUTION * texels.row.astype(np.int64) + texels.column)) / RESOLUTION**2
+    own = int(texels.center_inside.sum()) / RESOLUTION**2
+    shared = max(report["pages"][0]["utilisation"] - touched, 0.0)
+    return {"own_texels": round(own, 4), "used_texels": round(own + shared, 4)}
+
+
 def render(blend: Path, picture: Path, samples: int) -> None:
     """Render a file with Cycles, denoised."""
     import bpy
@@ -263,6 +305,10 @@ def join(folder: Path, room: Room) -> None:
 
 def record(folder: Path) -> None:
     """Write what all bakes cost into the results of the benchmarks, and the page's table from it."""
+    for cost in folder.glob("*/*/cost.json"):
+        known = json.loads(cost.read_text(encoding="utf-8"))
+        if cost.parts[-3] in (BEFORE, AFTER) and "used_texels" not in known:
+            cost.write_text(json.dumps(known | count_texels(cost.parent), indent=1) + "\n", encoding="utf-8")
     costs = {
         room.name: {
             when: costs_of(folder / when / room.name)

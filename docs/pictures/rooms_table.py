@@ -43,7 +43,8 @@ def costs_of(output: Path) -> dict[str, Any]:
     (page,) = report["pages"]
     return {
         "commit": cost["commit"],
-        "utilization": round(page["utilisation"], 4),
+        "used_texels": cost["used_texels"],
+        "own_texels": cost["own_texels"],
         "texels_per_meter": round(page["texels_per_metre"], 4),
         "processor_seconds": {stage: round(report["seconds"][stage], 1) for stage in STAGES},
         "whole_bake": cost["processor_seconds"],
@@ -63,11 +64,11 @@ def table(costs: dict[str, Any]) -> str:
 
 
 def _row(title: str, when: str, cost: dict[str, Any], errors: tuple[str, str]) -> str:
-    density = cost["texels_per_meter"]
+    density, own = cost["texels_per_meter"], cost["own_texels"]
     cells = [
         title if when == BEFORE else "",
         when,
-        f"{cost['utilization']:.0%}",
+        f"{cost['used_texels']:.0%}" + (f" ({own:.0%})" if own < cost["used_texels"] else ""),
         f"{density:.1f}" if density >= 10 else f"{density:.2f}",
         *(f"{cost['processor_seconds'][stage]:.0f} s" for stage in STAGES),
         f"{cost['whole_bake']:.0f} s",
