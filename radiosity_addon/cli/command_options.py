@@ -37,6 +37,13 @@ class _BakeCommand:
         SECTION,
         metavar="DIR",
     )
+    farm: str | None = option(
+        None,
+        "Start workers that share the bake: local:N starts N of them on this machine. Without --spool they use "
+        "a folder that the bake makes next to DIR, and removes",
+        SECTION,
+        metavar="SPEC",
+    )
     check: bool = option(
         False,
         "Bake nothing: show what would be baked, and problems of the scene; the exit code is 1 if a bake "

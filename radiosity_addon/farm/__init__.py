@@ -5,7 +5,12 @@ The bake itself is the one of `bake/`: it runs in one process, which gives the h
 
 from __future__ import annotations
 
+from .commands import COMMANDS
+from .commands import main as run_command
 from .executor import shared_bake
+from .helpers import Helpers
+from .local_workers import LocalWorkers
+from .output_spool import own_spool
 from .spool import Spool
 
-__all__ = ["Spool", "shared_bake"]
+__all__ = ["COMMANDS", "Helpers", "LocalWorkers", "Spool", "own_spool", "run_command", "shared_bake"]

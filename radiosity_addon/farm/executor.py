@@ -12,8 +12,10 @@ from typing import Any
 
 from ..base import Progress
 from ..numerics import run_by, thread_count
+from .helpers import Helpers, helped
 from .objects import ObjectError, Writer
 from .published import PublishedArrays
+from .signs import giving_signs
 from .spool import Spool
 from .tasks import is_kernel, run_task, task_count, values_of
 
@@ -125,13 +127,16 @@ class _SharedCall:
 
 
 @contextmanager
-def shared_bake(spool: Spool | None) -> Iterator[None]:
-    """Share what is baked within through a spool, which is emptied when it ends well; None shares nothing."""
+def shared_bake(spool: Spool | None, helpers: Helpers | None = None) -> Iterator[None]:
+    """Share what is baked within through a spool, which is emptied when it ends well; None shares nothing.
+
+    helpers: Started here, and ended whatever happens.
+    """
     if spool is None:
         yield
         return
     try:
-        with run_by(FolderExecutor(spool)), spool.giving_signs():
+        with run_by(FolderExecutor(spool)), giving_signs(spool.sign), helped(spool, helpers):
             yield
         spool.end()
     finally:

@@ -28,8 +28,13 @@ def unregister() -> None:
 
 
 def run(argv: list[str]) -> int:
-    """Run one command on the file that Blender has open; return its exit code."""
+    """Run one command on the file that Blender has open, or help with a bake; return its exit code."""
+    from ...farm import COMMANDS, run_command
     from .main import main
 
+    prog = f"blender -b FILE --command {COMMAND}"
+    if argv and argv[0] in COMMANDS:
+        return run_command(argv, f"blender -b --command {COMMAND}")
+
     loaded = Path(bpy.data.filepath) if bpy.data.filepath else None
-    return main(argv, prog=f"blender -b FILE --command {COMMAND}", loaded=loaded)
+    return main(argv, prog=prog, loaded=loaded)

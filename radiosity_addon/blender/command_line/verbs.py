@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,8 +12,8 @@ import bpy
 from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
-from ...cli import Console, Interrupts, Permissions, summary
-from ...farm import Spool
+from ...cli import Console, FarmSpec, Interrupts, Permissions, summary
+from ...farm import LocalWorkers, Spool, own_spool
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -53,6 +53,7 @@ def bake(
     preview: bool = True,
     form: Form | None = None,
     spool: Path | None = None,
+    farm: FarmSpec | None = None,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -80,8 +81,10 @@ def bake(
         What is exported afterwards: its files are checked before the bake starts.
     spool : Path or None
         The folder through which workers share the bake.
+    farm : FarmSpec or None
+        Workers that are started for it.
     """
-    with registered():
+    with registered(), ExitStack() as stack:
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
@@ -93,6 +96,8 @@ def bake(
             check_export(output, form, settings.quantity, allowed)
         keeping = KeepOptions(sidecar=True) if keep else None
         shared = None if spool is None else Spool.to_bake(spool)
+        if shared is None and farm is not None:
+            shared = stack.enter_context(own_spool(output))
         job = run_bake(
             bpy.context,
             settings,
@@ -102,6 +107,7 @@ def bake(
             notes=notes,
             with_preview=preview,
             spool=shared,
+            helpers=None if farm is None else LocalWorkers(farm.workers),
         )
         report = run_through(job, console, interrupts)
         if report_copy is not None:

@@ -13,7 +13,7 @@ from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pag
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
 from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
-from ...farm import Spool, shared_bake
+from ...farm import Helpers, Spool, shared_bake
 from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
@@ -54,6 +54,7 @@ def run_bake(
     notes: tuple[BakeWarning, ...] = (),
     with_preview: bool = True,
     spool: Spool | None = None,
+    helpers: Helpers | None = None,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -72,6 +73,7 @@ def run_bake(
     notes: What is known before the bake and belongs into its report.
     with_preview: False leaves `preview.png` out.
     spool: Through which workers share the bake.
+    helpers: Starts some of them.
     Yields status: The stage that begins or goes on. A picture holds what the viewports show as surfaces.
     Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
@@ -112,7 +114,7 @@ def run_bake(
         copies = Copies(SAMPLES if with_preview else None) if with_copy and output is not None else None
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         solved, _ = applying(copies)
-        baking = partial(_share, spool, partial(run_pipeline, plan, keeping, sidecar))
+        baking = partial(_share, spool, helpers, partial(run_pipeline, plan, keeping, sidecar))
         result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*warnings, *result.warnings))
         seconds.update(result.seconds)
@@ -158,12 +160,16 @@ def _plan(
 
 def _share(
     spool: Spool | None,
+    helpers: Helpers | None,
     baking: Callable[[Progress], tuple[BakeResult, KeptBake | None]],
     progress: Progress,
 ) -> tuple[BakeResult, KeptBake | None]:
     """Run the pipeline, with the help of workers if there is a spool."""
-    with shared_bake(spool):
-        return baking(progress)
+    with shared_bake(spool, helpers):
+        result, kept = baking(progress)
+    problems = () if helpers is None else helpers.problems
+    lines = tuple(BakeWarning("workers", line) for line in problems)
+    return replace(result, warnings=(*result.warnings, *lines)), kept
 
 
 def _solve(
