@@ -39,8 +39,8 @@ class _BakeCommand:
     )
     farm: str | None = option(
         None,
-        "Start workers that share the bake: local:N starts N of them on this machine. Without --spool they use "
-        "a folder that the bake makes next to DIR, and removes",
+        "Start workers that share the bake: local:N starts N on this machine, through a folder next to DIR "
+        "that the bake makes and removes without --spool; tls://HOST:PORT starts them on a Dask cluster",
         SECTION,
         metavar="SPEC",
     )

@@ -83,6 +83,10 @@ def check_sharing(request: argparse.Namespace) -> None:
                 raise UsageError(f"{flag} traces no rays, so there is nothing to share: leave --{option} out")
     if request.farm is not None:
         request.farm = farm_spec(request.farm)
+        if request.farm.scheduler and request.spool is None:
+            raise UsageError(
+                f"--farm {request.farm.scheduler} needs --spool DIR, a folder that all machines share"
+            )
 
 
 def check_plot(plot: Path | None) -> None:

@@ -7,10 +7,20 @@ from __future__ import annotations
 
 from .commands import COMMANDS
 from .commands import main as run_command
+from .dask_workers import DaskWorkers
 from .executor import shared_bake
 from .helpers import Helpers
 from .local_workers import LocalWorkers
 from .output_spool import own_spool
 from .spool import Spool
 
-__all__ = ["COMMANDS", "Helpers", "LocalWorkers", "Spool", "own_spool", "run_command", "shared_bake"]
+__all__ = [
+    "COMMANDS",
+    "DaskWorkers",
+    "Helpers",
+    "LocalWorkers",
+    "Spool",
+    "own_spool",
+    "run_command",
+    "shared_bake",
+]

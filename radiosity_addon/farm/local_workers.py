@@ -29,7 +29,7 @@ class LocalWorkers:
         self.problems: list[str] = []
         self._count, self._running = count, dict[int, HelpingProcess]()
         self._starts = dict.fromkeys(range(1, count + 1), 0)
-        self._over = Event()
+        self._over, self._watch = Event(), Thread()
 
     def start(self, spool: Spool) -> None:
         """See `Helpers`."""
@@ -39,7 +39,8 @@ class LocalWorkers:
     def end(self) -> None:
         """See `Helpers`."""
         self._over.set()
-        self._watch.join()
+        if self._watch.is_alive():
+            self._watch.join()
         for process in self._running.values():
             process.end()
 

@@ -58,6 +58,8 @@ class HelpingProcess:
 
     def end(self) -> None:
         """End it, and what it has started, as long as it runs."""
+        if self._said.closed:
+            return
         if self.code is None:
             self._signal("SIGTERM")
             try:

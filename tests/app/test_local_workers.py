@@ -65,8 +65,9 @@ def workers_of(folder: Path) -> list[int]:
 
 def claimants(spool: Spool, digest: str) -> set[int]:
     """Return the numbers of other processes that have claimed tasks of a call."""
-    claims = (spool.path / "calls" / digest).glob("*.claim")
-    return {int(claim.read_text().split()[1]) for claim in claims if claim.read_text() != this_process()}
+    claims = [claim.read_text() for claim in (spool.path / "calls" / digest).glob("*.claim")]
+    # A claim is there a moment before its text.
+    return {int(claim.split()[1]) for claim in claims if claim not in ("", this_process())}
 
 
 def each_call(monkeypatch: pytest.MonkeyPatch, then: Callable[[Spool, str], None]) -> None:

@@ -13,7 +13,7 @@ from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, FarmSpec, Interrupts, Permissions, summary
-from ...farm import LocalWorkers, Spool, own_spool
+from ...farm import DaskWorkers, Helpers, LocalWorkers, Spool, own_spool
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -90,6 +90,7 @@ def bake(
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
         check_places(_places(report_copy, plot), source)
         console.progress("open", 0.0)
+        helpers = None if farm is None else stack.enter_context(_helpers(farm))
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy, plot)
         if form is not None:
@@ -107,7 +108,7 @@ def bake(
             notes=notes,
             with_preview=preview,
             spool=shared,
-            helpers=None if farm is None else LocalWorkers(farm.workers),
+            helpers=helpers,
         )
         report = run_through(job, console, interrupts)
         if report_copy is not None:
@@ -118,6 +119,16 @@ def bake(
             write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "history of the solution"))
         console.lines(summary(str(output), files, report.as_dict()))
+
+
+@contextmanager
+def _helpers(farm: FarmSpec) -> Iterator[Helpers]:
+    """Yield what starts the workers that were asked for. Raises BakeError if the cluster is out of reach."""
+    helpers = DaskWorkers(farm.scheduler) if farm.scheduler else LocalWorkers(farm.workers)
+    try:
+        yield helpers
+    finally:
+        helpers.end()
 
 
 def run_through(job: Generator[Status, None, T], console: Console, interrupts: Interrupts) -> T:
