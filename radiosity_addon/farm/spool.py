@@ -52,11 +52,13 @@ class Spool:
     """A spool that exists, or is made.
 
     path: Its folder.
+    input_bytes: Of objects, arrays and calls that were written through it.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path.expanduser().resolve()
         self.sign = self.path / "baking"
+        self.input_bytes = 0
         self._arrays: Recent[Array] = Recent()
 
     @classmethod
@@ -170,6 +172,7 @@ class Spool:
         if not path.exists() or not self._is_whole(digest):
             with self._replacing(path) as aside, aside.open("wb") as file:
                 np.save(file, array, allow_pickle=False)
+            self.input_bytes += array.nbytes
         return digest
 
     def _is_whole(self, digest: str) -> bool:
@@ -289,6 +292,12 @@ class Spool:
         self._write(self.path / "over", b"")
         self.close_call()
 
+    def result_bytes(self, digest: str, task: int) -> int:
+        """Return the size of a result's file."""
+        with contextlib.suppress(OSError):
+            return (self._at("calls", digest) / f"{task}.result").stat().st_size
+        return 0
+
     def end(self) -> None:
         """Tell all workers that the bake has ended, and remove what it left."""
         self.say_over()
@@ -342,6 +351,7 @@ class Spool:
             if path.read_bytes() == content:
                 return
         self._write(path, content)
+        self.input_bytes += len(content)
 
     def _write(self, path: Path, content: bytes) -> None:
         with self._replacing(path) as aside:

@@ -91,8 +91,11 @@ def test_the_bake_starts_workers_and_a_spool(
     alone: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     helped: set[int] = set()
+    given: dict[str, list[int]] = {}
 
     def wait_for_both(spool: Spool, digest: str) -> None:
+        call = spool.call(digest)
+        given.setdefault(call["kernel"]["partial"][0]["function"], []).append(len(call["slices"]))
         if len(helped) < 2:
             until(lambda: claimants(spool, digest) or spool.done(digest))
             helped.update(claimants(spool, digest))
@@ -104,6 +107,19 @@ def test_the_bake_starts_workers_and_a_spool(
     assert (tmp_path / "out" / "lightmap.exr").read_bytes() == alone
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert not workers_of(tmp_path)
+    # What was moved, by kernel.
+    performance = json.loads((tmp_path / "out" / "report.json").read_text())["performance"]
+    shared = {entry.pop("kernel"): entry for entry in performance["shared"]}
+    assert sorted(shared) == sorted(given)
+    for name, calls in given.items():
+        entry = shared[name]
+        assert (entry["calls"], entry["tasks"]) == (len(calls), sum(calls))
+        assert entry["tasks_done_earlier"] == 0
+        assert 0 <= entry["tasks_by_workers"] <= entry["tasks"]
+        # Each has its own slices at least, and finds something.
+        assert min(entry["input_bytes"], entry["result_bytes"], entry["processor_seconds"]) > 0
+    # The first call was left to them, and is of one kernel.
+    assert sum(entry["tasks_by_workers"] for entry in shared.values()) >= 2
 
 
 def test_a_spool_that_was_given_stays(alone: bytes, tmp_path: Path) -> None:
@@ -205,6 +221,8 @@ def test_an_interrupted_bake_leaves_no_worker_and_goes_on(
     monkeypatch.setattr(Spool, "end", note)
     assert main([*BAKE, "--output", str(tmp_path / "out"), "--farm", "local:1"]) == 0
     assert kept == set(before)
+    performance = json.loads((tmp_path / "out" / "report.json").read_text())["performance"]
+    assert sum(entry["tasks_done_earlier"] for entry in performance["shared"]) == len(before)
     assert (tmp_path / "out" / "lightmap.exr").read_bytes() == alone
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 

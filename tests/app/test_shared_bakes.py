@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
@@ -349,6 +350,9 @@ def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
     spool.claim(digest, 0)
     spool.claim(digest, 1)
     spool.put_result(digest, 1, None, [])
-    assert f"{name}: 1 of 3 tasks done, 1 begun" in status()
+    spool.put_array(np.arange(50_000.0))
+    said = status()
+    assert f"{name}: 1 of 3 tasks done, 1 begun" in said
+    assert "0.4 MB of inputs, 0.0 MB of results" in said
     spool.end()
     assert "has ended" in status()

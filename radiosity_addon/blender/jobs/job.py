@@ -165,11 +165,14 @@ def _share(
     progress: Progress,
 ) -> tuple[BakeResult, KeptBake | None]:
     """Run the pipeline, with the help of workers if there is a spool."""
-    with shared_bake(spool, helpers):
+    with shared_bake(spool, helpers) as record:
         result, kept = baking(progress)
+    if spool is None:
+        return result, kept
     problems = () if helpers is None else helpers.problems
     lines = tuple(BakeWarning("workers", line) for line in problems)
-    return replace(result, warnings=(*result.warnings, *lines)), kept
+    performance = {**result.performance, "shared": record.by_kernel()}
+    return replace(result, warnings=(*result.warnings, *lines), performance=performance), kept
 
 
 def _solve(
