@@ -9,18 +9,23 @@ from .commands import COMMANDS
 from .commands import main as run_command
 from .dask_workers import DaskWorkers
 from .executor import shared_bake
+from .farm_command import FarmCommand
 from .helpers import Helpers
 from .local_workers import LocalWorkers
-from .output_spool import own_spool
+from .output_spool import own_spool, shared_in_folder
+from .records import ShareRecord
 from .spool import Spool
 
 __all__ = [
     "COMMANDS",
     "DaskWorkers",
+    "FarmCommand",
     "Helpers",
     "LocalWorkers",
+    "ShareRecord",
     "Spool",
     "own_spool",
     "run_command",
     "shared_bake",
+    "shared_in_folder",
 ]

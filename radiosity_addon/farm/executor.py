@@ -169,19 +169,17 @@ class _Found:
 
 
 @contextmanager
-def shared_bake(spool: Spool | None, helpers: Helpers | None = None) -> Iterator[ShareRecord]:
-    """Share what is baked within through a spool, which is emptied when it ends well; None shares nothing.
+def shared_bake(spool: Spool, helpers: Helpers | None = None) -> Iterator[ShareRecord]:
+    """Share what is baked within through a spool, which is emptied when it ends well.
 
     helpers: Started here, and ended whatever happens.
     Yields what is given away.
     """
-    if spool is None:
-        yield ShareRecord()
-        return
     executor = FolderExecutor(spool)
     try:
         with run_by(executor), giving_signs(spool.sign), helped(spool, helpers):
             yield executor.record
+        executor.record.problems += [] if helpers is None else helpers.problems
         spool.end()
     finally:
         spool.leave()

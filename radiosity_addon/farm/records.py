@@ -30,10 +30,14 @@ class CallRecord:
 
 
 class ShareRecord:
-    """All calls of a bake that were given away, in order."""
+    """All calls of a bake that were given away, in order.
+
+    problems: What went wrong with its helpers, a line each.
+    """
 
     def __init__(self) -> None:
         self.calls: list[CallRecord] = []
+        self.problems: list[str] = []
 
     def by_kernel(self) -> list[dict[str, Any]]:
         """Return for each kernel what the report says of it, in the order of their first calls."""

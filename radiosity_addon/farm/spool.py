@@ -108,12 +108,22 @@ class Spool:
         record = self._record()
         if record is None:
             return self.path.is_dir() and all(_OURS.fullmatch(path.name) for path in self.path.iterdir())
-        if record.get("made_for") != str(output):
+        if not self.is_made_for(output):
             return False
         refuse_second_bake(self.sign)
         if record.get("program") != identity():
             self.remove()
         return True
+
+    def is_made_for(self, folder: Path) -> bool:
+        """Return whether a bake has made the spool for itself and this folder."""
+        record = self._record()
+        return record is not None and record.get("made_for") == str(folder)
+
+    def last_sign(self) -> float:
+        """Return when a bake was last known to go on here [s since 1970]. Raises OSError if none ever was."""
+        sign = self.sign if self.sign.exists() else self.path / "spool.json"
+        return sign.stat().st_mtime
 
     @classmethod
     def to_work(cls, path: Path) -> Spool:

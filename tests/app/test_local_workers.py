@@ -227,6 +227,21 @@ def test_an_interrupted_bake_leaves_no_worker_and_goes_on(
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+def test_one_command_starts_a_machines_workers(alone: bytes, tmp_path: Path) -> None:
+    """`worker DIR --processes N`: they end with the bake, and the command when they have."""
+    words = [sys.executable, "-m", "radiosity_addon.farm", "worker", tmp_path / "spool"]
+    words += ["--wait", "60", "--processes", "2"]
+    with subprocess.Popen(list(map(str, words)), cwd=ROOT, stderr=subprocess.PIPE, text=True) as command:
+        with pytest.MonkeyPatch.context() as patch:
+            each_call(patch, lambda spool, digest: until(lambda: claimants(spool, digest)))
+            given = ["--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
+            assert main([*BAKE, *given]) == 0
+        assert command.communicate(timeout=60)[1] == ""
+    assert command.returncode == 0
+    assert not workers_of(tmp_path)
+    assert (tmp_path / "out" / "lightmap.exr").read_bytes() == alone
+
+
 def test_an_error_before_the_first_task_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

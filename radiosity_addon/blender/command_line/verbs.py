@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,7 +14,7 @@ from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, FarmSpec, Interrupts, Permissions, summary
-from ...farm import DaskWorkers, Helpers, LocalWorkers, Spool, own_spool
+from ...farm import DaskWorkers, Helpers, LocalWorkers, Spool, own_spool, shared_bake
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -107,8 +108,7 @@ def bake(
             keeping=keeping,
             notes=notes,
             with_preview=preview,
-            spool=shared,
-            helpers=helpers,
+            sharing=None if shared is None else partial(shared_bake, shared, helpers),
         )
         report = run_through(job, console, interrupts)
         if report_copy is not None:
