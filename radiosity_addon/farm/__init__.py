@@ -5,7 +5,6 @@ The bake itself is the one of `bake/`: it runs in one process, which gives the h
 
 from __future__ import annotations
 
-from .commands import COMMANDS
 from .commands import main as run_command
 from .dask_workers import DaskWorkers
 from .executor import shared_bake
@@ -17,7 +16,6 @@ from .records import ShareRecord
 from .spool import Spool
 
 __all__ = [
-    "COMMANDS",
     "DaskWorkers",
     "FarmCommand",
     "Helpers",

@@ -20,8 +20,6 @@ from .worker import wait_for, work
 IDLE = 3600.0
 """Seconds after which a worker that finds nothing to do ends."""
 
-COMMANDS = ("worker", "status")
-
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m radiosity_addon.farm") -> int:
     """Run one command and return its exit code."""

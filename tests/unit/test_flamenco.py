@@ -27,9 +27,9 @@ pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no Node.js
 
 def compiled(**settings: Any) -> dict[str, Any]:
     """Return what the script makes of a job: its type, settings and tasks."""
-    given = {"output": "/farm/out", "helpers": 3, "processes": 0, "options": "", "blendfile": "/farm/a b.blend"}
+    given = {"output": "/farm/out", "helpers": 3, "processes": 0, "options": ""}
     manager = Path(__file__).with_name("flamenco_manager.js")
-    words = ["node", str(manager), str(SCRIPT), json.dumps({**given, **settings})]
+    words = ["node", str(manager), str(SCRIPT), json.dumps({"blendfile": "/farm/a b.blend", **given, **settings})]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -48,7 +48,7 @@ def test_its_settings_are_flamencos() -> None:
     for setting in job["settings"]:
         assert set(setting) <= SETTING
         assert setting["type"] in ("string", "int32", "float", "bool")
-        assert setting.get("subtype", "dir_path") in ("file_path", "dir_path", "file_name", "hashed_file_path")
+        assert setting.get("subtype", "dir_path") in ("file_path", "dir_path", "file_name")
         assert setting["visible"] in ("visible", "hidden", "submission", "web")
 
 
