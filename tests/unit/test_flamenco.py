@@ -28,8 +28,9 @@ pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no Node.js
 def compiled(**settings: Any) -> dict[str, Any]:
     """Return what the script makes of a job: its type, settings and tasks."""
     given = {"output": "/farm/out", "helpers": 3, "processes": 0, "options": ""}
+    request = json.dumps({"blendfile": "/farm/a b.blend", **given, **settings})
     manager = Path(__file__).with_name("flamenco_manager.js")
-    words = ["node", str(manager), str(SCRIPT), json.dumps({"blendfile": "/farm/a b.blend", **given, **settings})]
+    words = ["node", str(manager), str(SCRIPT), request]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
