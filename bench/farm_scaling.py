@@ -55,7 +55,7 @@ class Call:
 class Costs:
     """What sharing costs besides tasks.
 
-    look: Seconds after which a worker that has waited sees a call.
+    look: Seconds between looks of workers that wait: they see a call spread evenly over this time.
     seconds_per_byte: Of the machine that has the spool, to all others together: 10 Gbit/s.
     read, take: Parts of the measured seconds for reading inputs and results.
     """
@@ -151,12 +151,13 @@ def simulated(calls: Sequence[Call], tail: float, workers: int, costs: Costs | N
 def call_seconds(call: Call, workers: int, costs: Costs) -> float:
     """Return how long a call is open: until the bake has taken up the last result.
 
-    Each worker that gets a task reads the inputs first, and all of them at once share the spool's bandwidth.
-    The bake works at tasks as well, and takes up results in order.
+    As many workers as there are tasks, those that look first, read the inputs, and share the spool's
+    bandwidth. The bake works at tasks as well, and takes up results in order.
     """
     helping = min(workers, len(call.tasks))
-    ready = costs.look + costs.read * call.read + helping * call.input_bytes * costs.seconds_per_byte
-    free = [(0.0, 0), *((ready, number) for number in range(1, helping + 1))]
+    ready = costs.read * call.read + helping * call.input_bytes * costs.seconds_per_byte
+    free = [(0.0, 0)]
+    free += [(ready + costs.look * (number - 0.5) / workers, number) for number in range(1, helping + 1)]
     heapq.heapify(free)
     taken = 0.0
     for seconds, take, size in zip(call.tasks, call.take, call.result_bytes, strict=True):

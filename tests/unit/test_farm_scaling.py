@@ -44,7 +44,9 @@ def test_no_call_is_faster_than_its_longest_task_nor_than_an_even_division() -> 
 def test_what_sharing_costs_is_added() -> None:
     two = call((4.0, 4.0), before=0.0)
     assert simulated([two], 0.0, 1, FREE) == 4.0
-    assert simulated([two], 0.0, 1, replace(FREE, look=0.1)) == pytest.approx(4.1)
+    assert simulated([two], 0.0, 1, replace(FREE, look=0.1)) == pytest.approx(4.05)
+    # The first of many sees it sooner.
+    assert simulated([two], 0.0, 100, replace(FREE, look=0.1)) == pytest.approx(4.0005)
     assert simulated([two], 0.0, 1, replace(FREE, read=1.0)) == pytest.approx(4.5)
     assert simulated([two], 0.0, 1, replace(FREE, take=1.0)) == pytest.approx(4.25)
     # The inputs, and then the result of the worker's task.
