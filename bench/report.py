@@ -96,9 +96,10 @@ def _qualities_table(compared: list[dict[str, Any]]) -> str:
             if times is None or "quality" not in error["settings"]:
                 continue
             oidn, apart = times["ratio_to_cycles_oidn"], _percent(error.get("without_coincident"))
+            estimated = _percent(error.get("estimated_error"))
             lines.append(
-                f"| {scene} | {row['label']} | {row['error']:.1%} | {_percent(error.get('estimated_error'))} | "
-                f"{apart} | {error['without_worst_1']:.1%} | "
+                f"| {scene} | {row['label']} | {row['error']:.1%} | {estimated} | {apart} | "
+                f"{error['without_worst_1']:.1%} | "
                 f"{_time({'seconds': times['seconds'], 'kind': 'measured'})} | "
                 f"{_times(times['ratio_to_cycles'])} | {'not reached' if oidn is None else _times(oidn)} |"
             )

@@ -207,7 +207,7 @@ def _blocks(array: Array) -> list[Array]:
 def _compressed(block: Array, level: int) -> bytes:
     width = block.dtype.itemsize
     planes = np.ascontiguousarray(block.view(np.uint8).reshape(-1, width).T)
-    return zlib.compress(planes, level)
+    return zlib.compress(planes.data, level)
 
 
 def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
