@@ -277,7 +277,7 @@ class Spool:
     def put_result(self, digest: str, task: int, tree: Any, arrays: list[Array]) -> None:
         """Write what a task found."""
         with self._replacing(self._at("calls", digest) / f"{task}.result") as aside:
-            write_arrays(aside, MAGIC, FORMAT, tree, arrays)
+            write_arrays(aside, MAGIC, FORMAT, tree, arrays, level=0)
 
     def result(self, digest: str, task: int) -> tuple[Any, list[Array]] | None:
         """Return what a task found; None, with the file removed, if it is damaged."""

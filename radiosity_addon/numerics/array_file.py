@@ -14,6 +14,7 @@ import os
 import struct
 import zlib
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -79,16 +80,20 @@ class TooLargeError(ArrayFileError):
     """A file that may be whole but takes more memory than is allowed."""
 
 
-def write_arrays(path: Path, magic: bytes, format_number: int, description: Any, arrays: list[Array]) -> int:
+def write_arrays(
+    path: Path, magic: bytes, format_number: int, description: Any, arrays: list[Array], level: int = LEVEL
+) -> int:
     """Write a description and arrays; return the bytes that they take.
 
     magic: 16 of them at most: the kind of file.
     description: What JSON can hold.
     arrays list of arrays of the `ARRAY_TYPES`.
+    level: Of zlib; 0 only wraps blocks, for files that are read once.
     Raises OSError if the file cannot be written.
     """
     with ThreadPoolExecutor() as threads:
-        blocks = [list(threads.map(_compressed, _blocks(array))) for array in arrays]
+        compressed = partial(_compressed, level=level)
+        blocks = [list(threads.map(compressed, _blocks(array))) for array in arrays]
     entries = [
         {
             "kind": array.dtype.name,
@@ -199,10 +204,10 @@ def _blocks(array: Array) -> list[Array]:
     return [flat[first : first + step] for first in range(0, len(flat), step)]
 
 
-def _compressed(block: Array) -> bytes:
+def _compressed(block: Array, level: int) -> bytes:
     width = block.dtype.itemsize
     planes = np.ascontiguousarray(block.view(np.uint8).reshape(-1, width).T)
-    return zlib.compress(planes.tobytes(), LEVEL)
+    return zlib.compress(planes.data, level)
 
 
 def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
