@@ -53,7 +53,7 @@ class LocalWorkers:
                     return
                 if process is None and self._starts[number] == 0:
                     self._start(number, spool)
-                elif process is not None and process.code is not None:
+                elif process is not None and process.code is not None and not spool.is_over():
                     self._follow(number, process, spool)
             self._over.wait(LOOK)
 

@@ -180,6 +180,34 @@ def test_workers_that_cannot_work_are_given_up(
     ]
 
 
+def test_workers_of_a_bake_that_is_over_are_not_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spool, starts, looks = Spool.to_bake(tmp_path), 0, 0
+    over, start = spool.is_over, local_workers.start_worker
+
+    def started(each: Spool) -> HelpingProcess:
+        nonlocal starts
+        starts += 1
+        return start(each)
+
+    def looked() -> bool:
+        nonlocal looks
+        looks += 1
+        return over()
+
+    monkeypatch.setattr(local_workers, "start_worker", started)
+    monkeypatch.setattr(spool, "is_over", looked)
+    workers = LocalWorkers(2)
+    spool.say_over()
+    workers.start(spool)
+    # Both have ended, and were looked at again.
+    until(lambda: looks > 5)
+    workers.end()
+    assert starts == 2
+    assert not workers.problems
+
+
 def waiting_bake(folder: Path) -> subprocess.Popen[str]:
     """Start a bake with workers; return when it waits with some of its tasks done."""
     words = [sys.executable, "-c", WAITING_BAKE, *BAKE, "--output", folder / "out", "--farm", "local:2"]
