@@ -85,6 +85,30 @@ def draw_growth(results: dict[str, Any], path: Path) -> None:
     plt.close(figure)
 
 
+def draw_farm(results: dict[str, Any], path: Path) -> None:
+    """Draw how much faster a shared bake is, against workers, and what it cannot exceed."""
+    rows = [row for row in results["simulated"] if row["workers"]]
+    workers = [row["workers"] for row in rows]
+    parts = results["with_most"]
+    shared, alone = parts["all_tasks"], results["alone"]
+    figure, panel = plt.subplots(figsize=(6.4, 4.2), constrained_layout=True)
+    panel.semilogx(workers, [row["speedup"] for row in rows], "o-", color=BLUE, label="simulated")
+    ideal = [alone / (parts["not_shared"] + shared / (count + 1)) for count in workers]
+    panel.semilogx(workers, ideal, "--", color=ORANGE, label="if tasks were divisible, and sharing free")
+    panel.axhline(alone / parts["not_shared"], color="0.6", linewidth=1, label="without all that is shared")
+    settings = results["settings"]
+    panel.set(
+        xlabel="workers, a core each",
+        ylabel="times as fast as alone",
+        title=f"office, {settings['resolution']}², {settings['quality']}",
+        ylim=(0.0, None),
+    )
+    panel.grid(True, which="both", color="0.93", linewidth=0.5)
+    panel.legend(frameon=False, fontsize=8)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    plt.close(figure)
+
+
 def _plain_numbers(axis: Any) -> None:
     """Label 1, 2, 5, 10 … as they are."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))

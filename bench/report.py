@@ -85,9 +85,9 @@ def _compared_table(compared: list[dict[str, Any]]) -> str:
 def _qualities_table(compared: list[dict[str, Any]]) -> str:
     """Return each quality's error and processor time, and what the others take to the same error."""
     lines = [
-        "| scene | quality | error | without coincident faces | without the worst 1 % | processor time "
-        "| Cycles | Cycles + OIDN |",
-        "|---|---|---|---|---|---|---|---|",
+        "| scene | quality | error | estimated | without coincident faces | without the worst 1 % "
+        "| processor time | Cycles | Cycles + OIDN |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for results in sorted(compared, key=lambda r: (r["case"] not in ("cornell", "interior"), r["case"])):
         scene, bakes = results["title"], {entry["label"]: entry for entry in results["ours"]}
@@ -96,8 +96,9 @@ def _qualities_table(compared: list[dict[str, Any]]) -> str:
             if times is None or "quality" not in error["settings"]:
                 continue
             oidn, apart = times["ratio_to_cycles_oidn"], _percent(error.get("without_coincident"))
+            estimated = _percent(error.get("estimated_error"))
             lines.append(
-                f"| {scene} | {row['label']} | {row['error']:.1%} | {apart} | "
+                f"| {scene} | {row['label']} | {row['error']:.1%} | {estimated} | {apart} | "
                 f"{error['without_worst_1']:.1%} | "
                 f"{_time({'seconds': times['seconds'], 'kind': 'measured'})} | "
                 f"{_times(times['ratio_to_cycles'])} | {'not reached' if oidn is None else _times(oidn)} |"

@@ -55,13 +55,13 @@ class Environment:
 
 
 def main_environment(root: Path) -> Environment:
-    """`.venv` with the bpy for its Python: the one it was made with, else the caller's."""
+    """`.venv` with the bpy for its Python, the one it was made with, else the caller's; and with Dask."""
     folder = root / ".venv"
     python = _python_version(folder) or sys.version_info[:2]
     if python not in BPY_OF_PYTHON:
         made_with = f"{python[0]}.{python[1]}"
         raise BuildError(f"{folder} was made with Python {made_with}; delete it and run this again")
-    return _with_bpy(root, folder, BPY_OF_PYTHON[python])
+    return _with_bpy(root, folder, BPY_OF_PYTHON[python], "dask")
 
 
 def bpy_environment(root: Path, bpy: str) -> Environment:
@@ -99,8 +99,8 @@ def bench_environment(root: Path) -> Environment:
     return Environment(root, main.folder, (folder,))
 
 
-def _with_bpy(root: Path, folder: Path, bpy: str) -> Environment:
-    pins = [root / "requirements" / f"bpy-{bpy}.txt", root / "requirements" / "tools.txt"]
+def _with_bpy(root: Path, folder: Path, bpy: str, *more: str) -> Environment:
+    pins = [root / "requirements" / f"{name}.txt" for name in (f"bpy-{bpy}", "tools", *more)]
     return _ready(root, folder, pins, PYTHON_OF_BPY[bpy], with_blender=True)
 
 

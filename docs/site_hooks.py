@@ -29,6 +29,9 @@ ROOT_PAGES = {
 }
 """Where the files of the repository's root stand in the site."""
 
+RESULTS = "bench/results/"
+"""The benchmarks' pictures, which stand in the site as they do in the repository."""
+
 DISPLAYED = r"\$\$(.+?)\$\$"
 # As on git hosts: no blank inside the dollars, and no digit after them, so that prices stay prices.
 INLINE = r"(?<![\\$\w])\$(?!\s)([^$]+?)(?<!\s)\$(?![\d$])"
@@ -69,9 +72,11 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages of the repository's root."""
+    """Add the pages of the repository's root, and the benchmarks' pictures."""
     for name, uri in ROOT_PAGES.items():
         files.append(File.generated(config, uri, content=(ROOT / name).read_text(encoding="utf-8")))
+    for picture in sorted((ROOT / RESULTS).glob("*.png")):
+        files.append(File.generated(config, RESULTS + picture.name, abs_src_path=str(picture)))
     return files
 
 
@@ -119,6 +124,8 @@ def site_link(target: str, in_repository: str, in_site: str) -> str:
         uri = path.removeprefix("docs/")
     elif path in ROOT_PAGES:
         uri = ROOT_PAGES[path]
+    elif path.startswith(RESULTS):
+        uri = path
     else:
         return target
     return posixpath.relpath(uri, posixpath.dirname(in_site) or ".")

@@ -23,7 +23,7 @@ LIT_BYTES = 48.0
 IMAGE_BYTES, COPY_BYTES = 16.0, 16.0
 """Of every pixel of an image in Blender, and of the copy that it is made from, one image at a time."""
 
-WORKING_BYTES, THREAD_BYTES = 120e6, 60e6
+WORKING_BYTES, THREAD_BYTES = 120e6, 80e6
 """Temporaries of a tile, and of each thread, of pages of at least …"""
 
 WORKING_PIXELS = 1 << 20

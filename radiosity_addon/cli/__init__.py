@@ -6,6 +6,7 @@ Needs neither Blender nor NumPy.
 from __future__ import annotations
 
 from .console import Console, summary
+from .farm_spec import FarmSpec
 from .interrupts import Interrupts
 from .parser import (
     bake_output,
@@ -21,6 +22,7 @@ from .temporary_folder import TemporaryFolder
 
 __all__ = [
     "Console",
+    "FarmSpec",
     "Interrupts",
     "Permissions",
     "TemporaryFolder",

@@ -37,6 +37,13 @@ class _BakeCommand:
         SECTION,
         metavar="DIR",
     )
+    farm: str | None = option(
+        None,
+        "Start workers that share the bake: local:N starts N on this machine, through a folder next to DIR "
+        "that the bake makes and removes without --spool; tls://HOST:PORT starts them on a Dask cluster",
+        SECTION,
+        metavar="SPEC",
+    )
     check: bool = option(
         False,
         "Bake nothing: show what would be baked, and problems of the scene; the exit code is 1 if a bake "

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 from ..base import UsageError
 from ..options import METHODS, OPTIONS, SECTIONS, BakeSettings, GroupSetting, Option, plain
 from .command_options import BAKE_COMMAND, EVERY_COMMAND, EVERY_EXPORT, EXPORT_COMMAND
+from .farm_spec import farm_spec
 from .path_checks import checked_folder, checked_name, checked_path
 
 BUNDLED_OUTPUT = Path("out/cornell")
@@ -75,10 +76,17 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
 
 
 def check_sharing(request: argparse.Namespace) -> None:
-    """Refuse to share what traces no rays."""
+    """Read who is to help, as a `FarmSpec` or None, and refuse to share what traces no rays."""
     for flag, given in (("--relight", request.relight), ("--check", request.check)):
-        if given and request.spool is not None:
-            raise UsageError(f"{flag} traces no rays, so there is nothing to share: leave --spool out")
+        for option in ("spool", "farm"):
+            if given and getattr(request, option) is not None:
+                raise UsageError(f"{flag} traces no rays, so there is nothing to share: leave --{option} out")
+    if request.farm is not None:
+        request.farm = farm_spec(request.farm)
+        if request.farm.scheduler and request.spool is None:
+            raise UsageError(
+                f"--farm {request.farm.scheduler} needs --spool DIR, a folder that all machines share"
+            )
 
 
 def check_plot(plot: Path | None) -> None:

@@ -5,7 +5,25 @@ The bake itself is the one of `bake/`: it runs in one process, which gives the h
 
 from __future__ import annotations
 
+from .commands import main as run_command
+from .dask_workers import DaskWorkers
 from .executor import shared_bake
+from .farm_command import FarmCommand
+from .helpers import Helpers
+from .local_workers import LocalWorkers
+from .output_spool import own_spool, shared_in_folder
+from .records import ShareRecord
 from .spool import Spool
 
-__all__ = ["Spool", "shared_bake"]
+__all__ = [
+    "DaskWorkers",
+    "FarmCommand",
+    "Helpers",
+    "LocalWorkers",
+    "ShareRecord",
+    "Spool",
+    "own_spool",
+    "run_command",
+    "shared_bake",
+    "shared_in_folder",
+]

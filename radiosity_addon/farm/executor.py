@@ -7,18 +7,23 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from ..base import Progress
 from ..numerics import run_by, thread_count
-from .objects import ObjectError, Writer
+from .helpers import Helpers, helped
+from .objects import ObjectError, Writer, digest_of, name_of
 from .published import PublishedArrays
+from .records import CallRecord, ShareRecord
+from .signs import giving_signs, this_process
 from .spool import Spool
 from .tasks import is_kernel, run_task, task_count, values_of
 
-FEWEST = 2
-"""Slices of a kernel that is given away, at least."""
+FEWEST = 4
+"""Slices of a kernel that is given away, at least: fewer are done here before others have read what they
+need."""
 
 POLL = 0.02
 """Seconds between looks for results."""
@@ -31,11 +36,15 @@ TIMES = 3.0
 
 
 class FolderExecutor:
-    """Gives kernels of many slices away through a spool; see `numerics.Executor`."""
+    """Gives kernels of many slices away through a spool; see `numerics.Executor`.
+
+    record: Of all calls that were given away.
+    """
 
     def __init__(self, spool: Spool) -> None:
         self._spool = spool
         self._store = PublishedArrays(spool)
+        self.record = ShareRecord()
 
     def run(
         self, work: Callable[[slice], Any], slices: list[slice], threads: int, progress: Progress
@@ -48,10 +57,15 @@ class FolderExecutor:
     def _results(
         self, work: partial[Any], slices: list[slice], threads: int, progress: Progress
     ) -> Iterator[Any]:
+        function: Any = work.func
+        record, before = CallRecord(name_of(function)), self._spool.input_bytes
         bounds = [[piece.start, piece.stop] for piece in slices]
-        tree = Writer(self._store).tree(work)
-        digest = self._spool.put_call(json.dumps({"kernel": tree, "slices": bounds}))
-        call = _SharedCall(self._spool, digest, work, bounds, threads)
+        text = json.dumps({"kernel": Writer(self._store).tree(work), "slices": bounds})
+        earlier = self._spool.done(digest_of(text))
+        digest = self._spool.put_call(text)
+        record.input_bytes = self._spool.input_bytes - before
+        call = _SharedCall(self._spool, digest, work, bounds, threads, record, earlier)
+        self.record.calls.append(record)
         try:
             for task in range(call.count):
                 yield from call.result(task, progress)
@@ -59,20 +73,29 @@ class FolderExecutor:
         finally:
             self._spool.close_call()
             call.close()
+            record.ended = time.monotonic()
 
 
 class _SharedCall:
     """A call whose tasks are done by workers, and here on some threads."""
 
     def __init__(
-        self, spool: Spool, digest: str, work: partial[Any], bounds: list[list[int]], threads: int
+        self,
+        spool: Spool,
+        digest: str,
+        work: partial[Any],
+        bounds: list[list[int]],
+        threads: int,
+        record: CallRecord,
+        earlier: set[int],
     ) -> None:
         self.count = task_count(len(bounds))
         self._spool, self._digest, self._work, self._bounds = spool, digest, work, bounds
         self._threads, self._pool = threads, ThreadPoolExecutor(threads)
-        self._running: dict[Future[list[Any]], int] = {}
-        self._found: dict[int, list[Any]] = {}
+        self._running: dict[Future[_Found], int] = {}
+        self._found: dict[int, _Found] = {}
         self._longest = 0.0
+        self._record, self._earlier = record, earlier
 
     def close(self) -> None:
         """Wait for what is being done here."""
@@ -80,11 +103,22 @@ class _SharedCall:
 
     def result(self, task: int, progress: Progress) -> list[Any]:
         """Return what a task found: wait for it, doing others meanwhile, and this one if nobody does."""
+        found = self._wait_for(task, progress)
+        if task in self._earlier:
+            self._record.earlier += 1
+        else:
+            self._record.seconds.append(found.seconds)
+            self._record.by_workers += not found.here
+        self._record.result_bytes.append(self._spool.result_bytes(self._digest, task))
+        return found.values
+
+    def _wait_for(self, task: int, progress: Progress) -> _Found:
         since = time.monotonic()
         while True:
             found = self._found.pop(task, None) or self._stored(task)
             if found is not None:
                 return found
+            self._earlier.discard(task)  # it may have been damaged
             self._do_free_tasks(task)
             here = task in self._running.values()
             if not here and time.monotonic() - since > max(PATIENCE, TIMES * self._longest):
@@ -96,11 +130,13 @@ class _SharedCall:
             for future in wait(self._running, POLL, FIRST_COMPLETED).done:
                 self._found[self._running.pop(future)] = future.result()
 
-    def _stored(self, task: int) -> list[Any] | None:
+    def _stored(self, task: int) -> _Found | None:
         """Return what a task found, if that is in the spool, and not damaged."""
         stored = self._spool.result(self._digest, task)
         with suppress(ObjectError):
-            return None if stored is None else values_of(*stored)
+            if stored is not None:
+                values, seconds, by = values_of(*stored)
+                return _Found(values, seconds, here=by == this_process())
         return None
 
     def _do_free_tasks(self, first: int) -> None:
@@ -117,22 +153,34 @@ class _SharedCall:
     def _do(self, task: int) -> None:
         self._running[self._pool.submit(self._timed, task)] = task
 
-    def _timed(self, task: int) -> list[Any]:
-        started = time.monotonic()
-        found = run_task(self._spool, self._digest, task, self._work, self._bounds)
+    def _timed(self, task: int) -> _Found:
+        started, busy = time.monotonic(), time.thread_time()
+        values = run_task(self._spool, self._digest, task, self._work, self._bounds)
         self._longest = max(self._longest, time.monotonic() - started)
-        return found
+        return _Found(values, time.thread_time() - busy, here=True)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a task found for each of its slices, its processor seconds, and whether this process did it."""
+
+    values: list[Any]
+    seconds: float
+    here: bool
 
 
 @contextmanager
-def shared_bake(spool: Spool | None) -> Iterator[None]:
-    """Share what is baked within through a spool, which is emptied when it ends well; None shares nothing."""
-    if spool is None:
-        yield
-        return
+def shared_bake(spool: Spool, helpers: Helpers | None = None) -> Iterator[ShareRecord]:
+    """Share what is baked within through a spool, which is emptied when it ends well.
+
+    helpers: Started here, and ended whatever happens.
+    Yields what is given away.
+    """
+    executor = FolderExecutor(spool)
     try:
-        with run_by(FolderExecutor(spool)), spool.giving_signs():
-            yield
+        with run_by(executor), giving_signs(spool.sign), helped(spool, helpers):
+            yield executor.record
+        executor.record.problems += [] if helpers is None else helpers.problems
         spool.end()
     finally:
         spool.leave()

@@ -19,15 +19,10 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 import re
-import socket
-import sys
-import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -38,14 +33,12 @@ from ..numerics import ArrayFileError, read_arrays, write_arrays
 from .identity import identity
 from .objects import KINDS, ObjectError, digest_of
 from .recent import Recent
+from .signs import refuse_second_bake, take_away, this_process
 
 Array = npt.NDArray[Any]
 
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
-
-SILENCE = 60.0
-"""Seconds after which a bake of another machine that gave no sign is gone."""
 
 _DIGEST = re.compile(r"[0-9a-f]{40}")
 _FOLDERS = ("arrays", "objects", "calls", "aside")
@@ -59,16 +52,20 @@ class Spool:
     """A spool that exists, or is made.
 
     path: Its folder.
+    input_bytes: Of objects, arrays and calls that were written through it.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path.expanduser().resolve()
+        self.sign = self.path / "baking"
+        self.input_bytes = 0
         self._arrays: Recent[Array] = Recent()
 
     @classmethod
-    def to_bake(cls, path: Path) -> Spool:
+    def to_bake(cls, path: Path, made_for: Path | None = None) -> Spool:
         """Return a spool to bake with: a new one in an empty folder, or one of this program.
 
+        made_for: The output folder of the bake that makes the spool for itself.
         Raises BakeError if the folder holds other things, another bake uses it, or it cannot be written to.
         """
         spool = cls(path)
@@ -79,52 +76,54 @@ class Spool:
                 # A bake that was killed at its start may have left what it was writing.
                 if not all(_OURS.fullmatch(path.name) for path in spool.path.iterdir()):
                     raise BakeError(f"'{spool.path}' is not empty and no spool: give an empty folder")
-                spool._write(record, json.dumps({"kind": KIND, "program": identity()}).encode())
+                made = {} if made_for is None else {"made_for": str(made_for)}
+                spool._write(record, json.dumps({"kind": KIND, "program": identity(), **made}).encode())
             spool.check()
-            spool._refuse_second_bake()
+            refuse_second_bake(spool.sign)
             for name in _FOLDERS:
                 (spool.path / name).mkdir(exist_ok=True)
             with contextlib.suppress(FileNotFoundError):
                 (spool.path / "over").unlink()
-            spool._write(spool.path / "baking", this_process().encode())
+            spool._write(spool.sign, this_process().encode())
         return spool
 
-    def _refuse_second_bake(self) -> None:
-        sign = self.path / "baking"
-        try:
-            host, number = sign.read_text().split()
-            if [host, number] == this_process().split():
-                return
-            alive = is_alive(int(number)) if host == socket.gethostname() else self._silence() < SILENCE
-        except (OSError, ValueError, OverflowError):
-            return
-        if alive:
-            raise BakeError(
-                f"spool '{self.path}' is used by process {number} on {host}: give each bake its own "
-                f"(if that is no bake, remove '{sign}')"
-            )
+    @classmethod
+    def of_output(cls, path: Path, output: Path) -> Spool:
+        """Return the spool that a bake makes for itself, or that an earlier bake into its folder has left.
 
-    def _silence(self) -> float:
-        """Return for how long the bake has given no sign [s]."""
-        return time.time() - (self.path / "baking").stat().st_mtime
+        Raises BakeError if something else has its name, or as `to_bake` does.
+        """
+        with _explained(path):
+            if path.is_symlink() or (path.exists() and not cls(path)._is_free_for(output)):
+                raise BakeError(
+                    f"'{path}' is in the way of the bake's spool: rename it, or give a folder with --spool"
+                )
+        return cls.to_bake(path, output)
 
-    @contextlib.contextmanager
-    def giving_signs(self) -> Iterator[None]:
-        """Show other machines that the bake goes on, also through stages that are not shared."""
-        over = Event()
+    def _is_free_for(self, output: Path) -> bool:
+        """Return whether the folder is empty, or the spool of bakes into `output`.
 
-        def give_signs() -> None:
-            while not over.wait(SILENCE / 10):
-                with contextlib.suppress(OSError):
-                    os.utime(self.path / "baking")
+        One that another version of the program has left is removed.
+        """
+        record = self._record()
+        if record is None:
+            return self.path.is_dir() and all(_OURS.fullmatch(path.name) for path in self.path.iterdir())
+        if not self.is_made_for(output):
+            return False
+        refuse_second_bake(self.sign)
+        if record.get("program") != identity():
+            self.remove()
+        return True
 
-        giver = Thread(target=give_signs, daemon=True)
-        giver.start()
-        try:
-            yield
-        finally:
-            over.set()
-            giver.join()
+    def is_made_for(self, folder: Path) -> bool:
+        """Return whether a bake has made the spool for itself and this folder."""
+        record = self._record()
+        return record is not None and record.get("made_for") == str(folder)
+
+    def last_sign(self) -> float:
+        """Return when a bake was last known to go on here [s since 1970]. Raises OSError if none ever was."""
+        sign = self.sign if self.sign.exists() else self.path / "spool.json"
+        return sign.stat().st_mtime
 
     @classmethod
     def to_work(cls, path: Path) -> Spool:
@@ -135,12 +134,8 @@ class Spool:
 
     def check(self) -> None:
         """Refuse what is no spool, or one of another program: its bytes would differ."""
-        path = self.path / "spool.json"
-        try:
-            record = json.loads(path.read_bytes())
-        except (OSError, ValueError, RecursionError):
-            record = None
-        if not isinstance(record, dict) or record.get("kind") != KIND:
+        path, record = self.path / "spool.json", self._record()
+        if record is None:
             if path.exists():
                 raise BakeError(f"'{path}' is damaged: give the bake an empty folder")
             raise BakeError(f"'{self.path}' is no spool; start the bake first, with --spool")
@@ -157,6 +152,14 @@ class Spool:
                 f"{ours.get(name)}): the lightmap would not be the same bytes; use one version on machines "
                 "of one kind"
             )
+
+    def _record(self) -> dict[str, Any] | None:
+        """Return what a spool says of itself; None if that is not there or damaged."""
+        try:
+            record = json.loads((self.path / "spool.json").read_bytes())
+        except (OSError, ValueError, RecursionError):
+            return None
+        return record if isinstance(record, dict) and record.get("kind") == KIND else None
 
     # Objects and arrays
 
@@ -179,6 +182,7 @@ class Spool:
         if not path.exists() or not self._is_whole(digest):
             with self._replacing(path) as aside, aside.open("wb") as file:
                 np.save(file, array, allow_pickle=False)
+            self.input_bytes += array.nbytes
         return digest
 
     def _is_whole(self, digest: str) -> bool:
@@ -273,7 +277,7 @@ class Spool:
     def put_result(self, digest: str, task: int, tree: Any, arrays: list[Array]) -> None:
         """Write what a task found."""
         with self._replacing(self._at("calls", digest) / f"{task}.result") as aside:
-            write_arrays(aside, MAGIC, FORMAT, tree, arrays)
+            write_arrays(aside, MAGIC, FORMAT, tree, arrays, level=0)
 
     def result(self, digest: str, task: int) -> tuple[Any, list[Array]] | None:
         """Return what a task found; None, with the file removed, if it is damaged."""
@@ -289,10 +293,24 @@ class Spool:
         except OSError as error:
             raise BakeError(f"cannot read '{path}': {error.strerror}") from error
 
-    def end(self) -> None:
-        """Tell all workers that the bake has ended, and remove what it left."""
+    def has_results(self) -> bool:
+        """Return whether there is anything that a bake can go on with."""
+        return any(self.path.glob("calls/*/*.result"))
+
+    def say_over(self) -> None:
+        """Tell all workers that the bake has ended."""
         self._write(self.path / "over", b"")
         self.close_call()
+
+    def result_bytes(self, digest: str, task: int) -> int:
+        """Return the size of a result's file."""
+        with contextlib.suppress(OSError):
+            return (self._at("calls", digest) / f"{task}.result").stat().st_size
+        return 0
+
+    def end(self) -> None:
+        """Tell all workers that the bake has ended, and remove what it left."""
+        self.say_over()
         self.leave()
         left = [path for path in self.path.glob(".*") if path.is_file()]
         for folder in (self.path / name for name in _FOLDERS):
@@ -306,11 +324,19 @@ class Spool:
                 elif _OURS.fullmatch(path.relative_to(self.path).as_posix()):
                     path.unlink()
 
+    def remove(self) -> None:
+        """Remove the spool with all that we wrote; the folder stays if it holds anything else."""
+        with contextlib.suppress(OSError, BakeError):
+            self.end()
+        for name in ("open", "baking", "over", "spool.json"):
+            with contextlib.suppress(OSError):
+                (self.path / name).unlink()
+        with contextlib.suppress(OSError):
+            self.path.rmdir()
+
     def leave(self) -> None:
         """Take the sign away that a bake goes on here: another may go on with it at once."""
-        with contextlib.suppress(OSError):
-            if (self.path / "baking").read_text() == this_process():
-                (self.path / "baking").unlink()
+        take_away(self.sign)
 
     def is_over(self) -> bool:
         """Return whether the bake has ended."""
@@ -335,6 +361,7 @@ class Spool:
             if path.read_bytes() == content:
                 return
         self._write(path, content)
+        self.input_bytes += len(content)
 
     def _write(self, path: Path, content: bytes) -> None:
         with self._replacing(path) as aside:
@@ -353,24 +380,6 @@ class Spool:
                 with contextlib.suppress(OSError):
                     aside.unlink()
                 raise
-
-
-def this_process() -> str:
-    """Return this machine's name and the number of this process."""
-    return f"{socket.gethostname()} {os.getpid()}"
-
-
-def is_alive(number: int) -> bool:
-    """Return whether a process of this machine runs."""
-    if sys.platform == "win32":
-        return False  # to send signal 0 there would end it
-    try:
-        os.kill(number, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        pass  # somebody else's
-    return True
 
 
 def array_digest(array: Array) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from .objects import ObjectError
 from .spool import Spool
 from .tasks import task_count
@@ -21,4 +23,18 @@ def status_lines(spool: Spool) -> list[str]:
     except (ObjectError, KeyError, TypeError, IndexError) as error:
         return [f"the call that waits cannot be read: {error}"]
     done, claimed = spool.done(digest), spool.claimed(digest)
-    return [f"{kernel}: {len(done)} of {total} tasks done, {len(claimed - done)} begun"]
+    return [
+        f"{kernel}: {len(done)} of {total} tasks done, {len(claimed - done)} begun",
+        f"{_megabytes(spool, 'arrays/*', 'objects/*')} MB of inputs, "
+        f"{_megabytes(spool, 'calls/*/*.result')} MB of results",
+    ]
+
+
+def _megabytes(spool: Spool, *patterns: str) -> str:
+    """Return the size of files in the spool."""
+    size = 0
+    for pattern in patterns:
+        for path in spool.path.glob(pattern):
+            with suppress(OSError):
+                size += path.stat().st_size
+    return f"{size / 1e6:.1f}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from functools import partial
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 
 from .objects import ObjectError, Reader, Writer, digest_of, name_of
 from .recent import Recent
+from .signs import this_process
 from .spool import Spool
 
 MOST_TASKS = 256
@@ -96,23 +99,28 @@ def task_count(slices: int) -> int:
 
 def run_task(spool: Spool, digest: str, task: int, work: partial[Any], bounds: list[list[int]]) -> list[Any]:
     """Run a kernel for the slices of a task, write what they found, and return it."""
-    step = slices_of_task(len(bounds))
+    step, started = slices_of_task(len(bounds)), time.thread_time()
     found = [work(slice(*pair)) for pair in bounds[task * step : (task + 1) * step]]
     store = _ResultStore()
     tree = Writer(store).tree(found)
     # Of truth values and numbers; a scalar's array has no axis.
     arrays = [np.ascontiguousarray(array) for array in store.arrays]
-    spool.put_result(digest, task, {"found": tree, "objects": store.objects}, arrays)
+    done = {"seconds": time.thread_time() - started, "by": this_process()}
+    spool.put_result(digest, task, {"found": tree, "objects": store.objects, **done}, arrays)
     return found
 
 
-def values_of(description: Any, arrays: list[Any]) -> list[Any]:
-    """Return what the slices of a task found. Raises ObjectError if it is not as `run_task` wrote it."""
+def values_of(description: Any, arrays: list[Any]) -> tuple[list[Any], float, str]:
+    """Return what the slices of a task found, its processor seconds, and by which process.
+
+    Raises ObjectError if it is not as `run_task` wrote it.
+    """
     try:
         store = _ResultStore(description["objects"], arrays)
         found = Reader(store).value(description["found"])
-    except (KeyError, TypeError) as error:
+        seconds, by = float(description["seconds"]), str(description["by"])
+    except (KeyError, TypeError, ValueError) as error:
         raise ObjectError(str(error)) from error
-    if not isinstance(found, list):
+    if not isinstance(found, list) or not 0 <= seconds < math.inf:
         raise ObjectError("no list of results")
-    return found
+    return found, seconds, by

@@ -1,8 +1,8 @@
 """A file of numbers and arrays with a digest of its content; reading it runs nothing.
 
 The head is a few bytes of magic, the format's number, and a digest of all that follows: a description in
-JSON, then arrays in compressed blocks. Bytes of equal weight lie together (the first of every number, then
-the second …), which halves what integers and fractions of about the same size take.
+JSON, then arrays in blocks. Where these are compressed, bytes of equal weight lie together (the first of
+every number, then the second …), which halves what integers and fractions of about the same size take.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import os
 import struct
 import zlib
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -79,16 +80,20 @@ class TooLargeError(ArrayFileError):
     """A file that may be whole but takes more memory than is allowed."""
 
 
-def write_arrays(path: Path, magic: bytes, format_number: int, description: Any, arrays: list[Array]) -> int:
+def write_arrays(
+    path: Path, magic: bytes, format_number: int, description: Any, arrays: list[Array], level: int = LEVEL
+) -> int:
     """Write a description and arrays; return the bytes that they take.
 
     magic: 16 of them at most: the kind of file.
     description: What JSON can hold.
     arrays list of arrays of the `ARRAY_TYPES`.
+    level: Of zlib; 0 leaves arrays as they are, for files that are read once.
     Raises OSError if the file cannot be written.
     """
     with ThreadPoolExecutor() as threads:
-        blocks = [list(threads.map(_compressed, _blocks(array))) for array in arrays]
+        compressed = partial(_compressed, level=level)
+        blocks = [list(threads.map(compressed, _blocks(array))) for array in arrays]
     entries = [
         {
             "kind": array.dtype.name,
@@ -97,7 +102,8 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
         }
         for array, array_blocks in zip(arrays, blocks, strict=True)
     ]
-    head = zlib.compress(json.dumps({"description": description, "arrays": entries}).encode())
+    told = {"description": description, "arrays": entries, **({} if level else {"plain": True})}
+    head = zlib.compress(json.dumps(told).encode())
     body = [head, *(block for array_blocks in blocks for block in array_blocks)]
     digest = hashlib.blake2b(digest_size=32)
     for part in body:
@@ -136,7 +142,7 @@ def read_arrays(
             raise ArrayFileError(f"it claims to hold {total >> 20} MB, which a file of its size cannot")
         if total > most:
             raise TooLargeError(f"it takes {total >> 20} MB, more than the memory limit of {most >> 20} MB")
-        return head["description"], _read(body[length:], entries)
+        return head["description"], _read(body[length:], entries, plain=bool(head.get("plain")))
     except _DAMAGED as error:
         raise ArrayFileError("it is damaged") from error
 
@@ -199,13 +205,15 @@ def _blocks(array: Array) -> list[Array]:
     return [flat[first : first + step] for first in range(0, len(flat), step)]
 
 
-def _compressed(block: Array) -> bytes:
+def _compressed(block: Array, level: int) -> bytes:
+    if not level:
+        return block.tobytes()
     width = block.dtype.itemsize
     planes = np.ascontiguousarray(block.view(np.uint8).reshape(-1, width).T)
-    return zlib.compress(planes.tobytes(), LEVEL)
+    return zlib.compress(planes.data, level)
 
 
-def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
+def _read(body: memoryview, entries: list[dict[str, Any]], plain: bool) -> list[Array]:
     """Return the arrays that entries describe."""
     made, jobs, at = [], [], 0
     for entry in entries:
@@ -224,18 +232,28 @@ def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
     if at != len(body):
         raise ValueError("more or less than was described")
     with ThreadPoolExecutor() as threads:
-        list(threads.map(_expand, jobs))
+        list(threads.map(_copy if plain else _expand, jobs))
     return made
+
+
+def _copy(job: tuple[Array, memoryview]) -> None:
+    """Fill a block from its bytes."""
+    target, stored = job
+    _fill(target, np.frombuffer(stored, dtype=np.uint8).reshape(-1, target.dtype.itemsize))
 
 
 def _expand(job: tuple[Array, memoryview]) -> None:
     """Fill a block from its compressed bytes."""
     target, packed = job
-    width = target.dtype.itemsize
     # No more is unpacked than there is room for, whatever the bytes say.
-    bytes_of = np.frombuffer(_unpacked(packed, target.nbytes), dtype=np.uint8).reshape(width, -1)
-    if bytes_of.size != target.nbytes:
+    content = np.frombuffer(_unpacked(packed, target.nbytes), dtype=np.uint8)
+    _fill(target, content.reshape(target.dtype.itemsize, -1).T)
+
+
+def _fill(target: Array, numbers: Array) -> None:
+    """Fill a block from the bytes (n, width) of its numbers."""
+    if numbers.size != target.nbytes:
         raise ValueError("too short")
-    if target.dtype == np.bool_ and (bytes_of > 1).any():
+    if target.dtype == np.bool_ and (numbers > 1).any():
         raise ValueError("neither true nor false")
-    target.view(np.uint8).reshape(-1, width)[:] = bytes_of.T
+    target.view(np.uint8).reshape(numbers.shape)[:] = numbers

@@ -28,7 +28,7 @@ def checkout(tmp_path: Path) -> Path:
     """A checkout whose pins are empty, so that its environments need no network."""
     pins = tmp_path / "requirements"
     pins.mkdir()
-    for name in ("bpy-4.2", "bpy-5.0", "bpy-5.2", "docs", "quick", "tools"):
+    for name in ("bpy-4.2", "bpy-5.0", "bpy-5.2", "dask", "docs", "quick", "tools"):
         (pins / f"{name}.txt").write_text("# nothing\n")
     return tmp_path
 

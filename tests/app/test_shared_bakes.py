@@ -10,16 +10,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.base import BakeError
 from radiosity_addon.blender.command_line.main import main
-from radiosity_addon.farm import Spool, shared_bake
+from radiosity_addon.farm import Spool, run_command, shared_bake
 from radiosity_addon.farm.tasks import KERNELS
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -34,9 +35,12 @@ ROOMS = {"room": room, "glass": glazed_room}
 BAKE = """
 import sys
 from pathlib import Path
+from radiosity_addon.farm import executor
 from tests.app.test_shared_bakes import baked_bytes, ends_after, waits_for_a_worker, ROOMS
 spool, name, kernel, results = sys.argv[1:]
 if kernel:
+    # A small room's calls have few slices.
+    executor.FEWEST = 2
     waits_for_a_worker(kernel)
 if int(results):
     ends_after(int(results))
@@ -56,7 +60,7 @@ main(["worker", spool, "--idle", "60"])
 
 def baked_bytes(scene: BakeScene, spool: Path | None = None) -> str:
     """Return a digest of a scene's lightmap, baked here or with the workers of a spool."""
-    with shared_bake(None if spool is None else Spool.to_bake(spool)):
+    with nullcontext() if spool is None else shared_bake(Spool.to_bake(spool)):
         result = bake(scene, SETTINGS)
     return hashlib.sha1(b"".join(page.pixels.tobytes() for page in result.pages)).hexdigest()
 
@@ -268,13 +272,14 @@ def test_a_folder_of_other_things_is_refused_before_the_bake(
 
 
 @pytest.mark.parametrize("flag", ["--relight", "--check"])
+@pytest.mark.parametrize("how", ["spool", "farm"])
 def test_what_traces_no_rays_has_nothing_to_share(
-    flag: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    flag: str, how: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["bake", flag, "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
-    assert main(words) == 2
-    assert "leave --spool out" in capsys.readouterr().err
-    assert not (tmp_path / "spool").exists()
+    shared = {"spool": str(tmp_path / "spool"), "farm": "local:2"}[how]
+    assert main(["bake", flag, "--output", str(tmp_path / "out"), f"--{how}", shared]) == 2
+    assert f"leave --{how} out" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_worker_runs_nothing_but_kernels(tmp_path: Path) -> None:
@@ -290,6 +295,46 @@ def test_a_worker_runs_nothing_but_kernels(tmp_path: Path) -> None:
     assert "no kernel" in ran.stdout
     assert "0 tasks done" in ran.stdout
     assert not list(tmp_path.glob("calls/*/*.result"))
+
+
+def test_a_worker_can_wait_for_the_spool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What queues start at the same time as the bake."""
+    spool, looks = tmp_path / "later", 0
+    sleep = time.sleep
+
+    def make_at_the_third_look(seconds: float) -> None:
+        nonlocal looks
+        looks += 1
+        if looks == 3:
+            Spool.to_bake(spool).say_over()
+        sleep(min(seconds, 0.01))
+
+    monkeypatch.setattr(time, "sleep", make_at_the_third_look)
+    assert run_command(["worker", str(spool), "--wait", "60"]) == 0
+    assert looks == 3
+    monkeypatch.undo()
+    assert run_command(["worker", str(tmp_path / "never"), "--wait", "0.1"]) == 1
+
+
+@pytest.mark.parametrize("words", ["--wait -1", "--wait soon", "--idle nan", "--processes -1"])
+def test_what_is_no_number_is_a_usage_error(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["worker", str(tmp_path), *words.split()]) == 2
+    assert "error: " in capsys.readouterr().err
+
+
+def test_blender_itself_runs_workers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`blender -b --command radiosity worker DIR`, where no other Python has our packages."""
+    from radiosity_addon.blender.command_line import host
+
+    assert host.run(["worker", str(tmp_path / "none")]) == 1
+    assert capsys.readouterr().err.endswith("is no spool; start the bake first, with --spool\n")
+    Spool.to_bake(tmp_path).end()
+    assert host.run(["worker", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == "0 tasks done\n"
+    assert host.run(["status", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == "the bake has ended\n"
 
 
 def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
@@ -308,6 +353,9 @@ def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
     spool.claim(digest, 0)
     spool.claim(digest, 1)
     spool.put_result(digest, 1, None, [])
-    assert f"{name}: 1 of 3 tasks done, 1 begun" in status()
+    spool.put_array(np.arange(50_000.0))
+    said = status()
+    assert f"{name}: 1 of 3 tasks done, 1 begun" in said
+    assert "0.4 MB of inputs, 0.0 MB of results" in said
     spool.end()
     assert "has ended" in status()

@@ -25,10 +25,10 @@ ARRAYS = [
 ]
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
+@pytest.fixture(params=[array_file.LEVEL, 0], ids=["compressed", "plain"])
+def path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     file = tmp_path / "some.arrays"
-    size = write_arrays(file, MAGIC, 3, {"told": ["ä", 0.1]}, ARRAYS)
+    size = write_arrays(file, MAGIC, 3, {"told": ["ä", 0.1]}, ARRAYS, request.param)
     assert size == file.stat().st_size
     return file
 
@@ -42,8 +42,15 @@ def test_arrays_come_back_as_they_were(path: Path) -> None:
         assert found.flags.writeable
 
 
+@pytest.mark.parametrize("path", [array_file.LEVEL], indirect=True)
 def test_numbers_of_about_one_size_take_less_than_they_are(path: Path) -> None:
     assert path.stat().st_size < 0.5 * sum(array.nbytes for array in ARRAYS)
+
+
+def test_a_plain_file_takes_what_its_arrays_take(tmp_path: Path) -> None:
+    size = write_arrays(tmp_path / "some.arrays", MAGIC, 3, None, ARRAYS, level=0)
+    arrays = sum(array.nbytes for array in ARRAYS)
+    assert arrays < size < arrays + 400
 
 
 @pytest.mark.parametrize("share", [0.0, 0.00001, 0.3, 0.999999])
@@ -134,6 +141,7 @@ def test_a_description_that_is_a_bomb_is_refused(tmp_path: Path) -> None:
         read_arrays(path, MAGIC, 3)
 
 
+@pytest.mark.parametrize("path", [array_file.LEVEL], indirect=True)
 def test_what_exceeds_the_memory_that_is_allowed_is_refused(path: Path) -> None:
     total = sum(array.nbytes for array in ARRAYS)
     read_arrays(path, MAGIC, 3, most=total)

@@ -18,7 +18,7 @@ from radiosity_addon.base import BakeError
 from radiosity_addon.farm import Spool, shared_bake
 from radiosity_addon.farm.identity import identity
 from radiosity_addon.farm.objects import ObjectError, digest_of
-from radiosity_addon.farm.spool import this_process
+from radiosity_addon.farm.signs import this_process
 from radiosity_addon.farm.status import status_lines
 from radiosity_addon.farm.tasks import KERNELS
 from radiosity_addon.farm.worker import work
@@ -198,7 +198,7 @@ def test_other_machines_see_a_bake_through_all_of_its_stages(
     spool: Spool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also if no kernel is shared for long; and as soon as it fails, another may go on with it."""
-    monkeypatch.setattr("radiosity_addon.farm.spool.SILENCE", 0.1)
+    monkeypatch.setattr("radiosity_addon.farm.signs.SILENCE", 0.1)
     sign = spool.path / "baking"
 
     def fail_late() -> None:

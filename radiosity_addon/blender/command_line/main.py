@@ -129,6 +129,7 @@ def _run(
                     preview=not request.no_preview,
                     form=form,
                     spool=request.spool,
+                    farm=request.farm,
                 )
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
@@ -143,19 +144,24 @@ def _run(
                 export(
                     request.folder if settings is None else request.output, form, allowed, console, interrupts
                 )
-    except KeyboardInterrupt:
-        return _fail(INTERRUPTED, EXIT_INTERRUPTED)
+    except KeyboardInterrupt as interrupt:
+        return _fail(_with_notes(INTERRUPTED, interrupt), EXIT_INTERRUPTED)
     except RadiosityError as error:
         # An importer that Ctrl-C stopped comes back with a failure of its own.
         if interrupts.requested:
-            return _fail(INTERRUPTED, EXIT_INTERRUPTED)
-        return _fail(str(error), error.exit_code)
+            return _fail(_with_notes(INTERRUPTED, error), EXIT_INTERRUPTED)
+        return _fail(_with_notes(str(error), error), error.exit_code)
     except MemoryError:
         return _fail("out of memory; lower the resolution, the texel density or the quality", EXIT_FAILED)
     except Exception as error:  # noqa: BLE001 (the last resort: a code and a line, not a bare crash)
         traceback.print_exc()
         return _fail(f"internal error, please report it: {type(error).__name__}: {error}", EXIT_FAILED)
     return EXIT_DONE
+
+
+def _with_notes(message: str, error: BaseException) -> str:
+    """Return an error's message, and what its way up has added to it."""
+    return "; ".join((message, *getattr(error, "__notes__", ())))
 
 
 def _fail(message: str, code: int) -> int:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,8 +13,8 @@ import bpy
 from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
-from ...cli import Console, Interrupts, Permissions, summary
-from ...farm import Spool
+from ...cli import Console, FarmSpec, Interrupts, Permissions, summary
+from ...farm import DaskWorkers, Helpers, LocalWorkers, Spool, own_spool, shared_bake
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -53,6 +54,7 @@ def bake(
     preview: bool = True,
     form: Form | None = None,
     spool: Path | None = None,
+    farm: FarmSpec | None = None,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -80,19 +82,24 @@ def bake(
         What is exported afterwards: its files are checked before the bake starts.
     spool : Path or None
         The folder through which workers share the bake.
+    farm : FarmSpec or None
+        Workers that are started for it.
     """
-    with registered():
+    with registered(), ExitStack() as stack:
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
         check_places(_places(report_copy, plot), source)
         console.progress("open", 0.0)
+        helpers = None if farm is None else stack.enter_context(_helpers(farm))
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy, plot)
         if form is not None:
             check_export(output, form, settings.quantity, allowed)
         keeping = KeepOptions(sidecar=True) if keep else None
         shared = None if spool is None else Spool.to_bake(spool)
+        if shared is None and farm is not None:
+            shared = stack.enter_context(own_spool(output))
         job = run_bake(
             bpy.context,
             settings,
@@ -101,7 +108,7 @@ def bake(
             keeping=keeping,
             notes=notes,
             with_preview=preview,
-            spool=shared,
+            sharing=None if shared is None else partial(shared_bake, shared, helpers),
         )
         report = run_through(job, console, interrupts)
         if report_copy is not None:
@@ -112,6 +119,16 @@ def bake(
             write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "history of the solution"))
         console.lines(summary(str(output), files, report.as_dict()))
+
+
+@contextmanager
+def _helpers(farm: FarmSpec) -> Iterator[Helpers]:
+    """Yield what starts the workers that were asked for. Raises BakeError if the cluster is out of reach."""
+    helpers = DaskWorkers(farm.scheduler) if farm.scheduler else LocalWorkers(farm.workers)
+    try:
+        yield helpers
+    finally:
+        helpers.end()
 
 
 def run_through(job: Generator[Status, None, T], console: Console, interrupts: Interrupts) -> T:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from functools import partial
 
@@ -13,7 +13,7 @@ from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pag
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
 from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
-from ...farm import Spool, shared_bake
+from ...farm import ShareRecord
 from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
@@ -30,6 +30,8 @@ from ..session.background import in_thread
 from .finish import BakeJob, Copies, Scope, applying, finish
 from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
+
+Sharing = Callable[[], AbstractContextManager[ShareRecord]]
 
 SOLVE = 0.03
 """How far the whole is when the scene has been read; rough."""
@@ -53,7 +55,7 @@ def run_bake(
     only_changed: bool = False,
     notes: tuple[BakeWarning, ...] = (),
     with_preview: bool = True,
-    spool: Spool | None = None,
+    sharing: Sharing | None = None,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -71,7 +73,7 @@ def run_bake(
         then. If objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
     notes: What is known before the bake and belongs into its report.
     with_preview: False leaves `preview.png` out.
-    spool: Through which workers share the bake.
+    sharing: Called when the pipeline begins, in its thread: shares with workers what is baked within.
     Yields status: The stage that begins or goes on. A picture holds what the viewports show as surfaces.
     Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
@@ -112,7 +114,7 @@ def run_bake(
         copies = Copies(SAMPLES if with_preview else None) if with_copy and output is not None else None
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         solved, _ = applying(copies)
-        baking = partial(_share, spool, partial(run_pipeline, plan, keeping, sidecar))
+        baking = partial(_share, sharing, partial(run_pipeline, plan, keeping, sidecar))
         result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*warnings, *result.warnings))
         seconds.update(result.seconds)
@@ -157,13 +159,18 @@ def _plan(
 
 
 def _share(
-    spool: Spool | None,
+    sharing: Sharing | None,
     baking: Callable[[Progress], tuple[BakeResult, KeptBake | None]],
     progress: Progress,
 ) -> tuple[BakeResult, KeptBake | None]:
-    """Run the pipeline, with the help of workers if there is a spool."""
-    with shared_bake(spool):
+    """Run the pipeline, with the help of workers if that is wanted."""
+    if sharing is None:
         return baking(progress)
+    with sharing() as record:
+        result, kept = baking(progress)
+    lines = tuple(BakeWarning("workers", line) for line in record.problems)
+    performance = {**result.performance, "shared": record.by_kernel()}
+    return replace(result, warnings=(*lines, *result.warnings), performance=performance), kept
 
 
 def _solve(

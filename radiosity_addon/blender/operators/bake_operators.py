@@ -53,6 +53,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
         from ..files.output import OutputFolder
+        from ..jobs.farm import ended_with, farm_of
         from ..jobs.job import run_bake
 
         session.stop_live()
@@ -64,9 +65,17 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
         keeping = self._keeping(context.scene, settings)
         if in_window and context.scene.radiosity.show_while_solving:
             live_view.begin(context.scene)
-        return run_bake(
-            context, settings, output, in_background=in_window, keeping=keeping, only_changed=changed
+        command, sharing = farm_of(context)
+        job = run_bake(
+            context,
+            settings,
+            output,
+            in_background=in_window,
+            keeping=keeping,
+            only_changed=changed,
+            sharing=sharing,
         )
+        return job if command is None else ended_with(job, command)
 
     @staticmethod
     def _keeping(scene: bpy.types.Scene, settings: BakeSettings) -> KeepOptions | None:

@@ -40,6 +40,18 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
         default=True,
     )
 
+    farm_command: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Farm Command",
+        description="Command that is run once for each bake to start workers that help with it, without a "
+        "shell. {spool} in it stands for the bake's folder. Empty: bakes are not shared",
+    )
+    spool_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Spool Folder",
+        description="Folder that all machines with workers share: each bake makes one of its own in it, and "
+        "removes that at its end. Empty: bakes are not shared",
+        subtype="DIR_PATH",
+    )
+
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw them."""
         layout = self.layout
@@ -50,6 +62,9 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
         column.prop(self, "memory_limit")
         column.prop(self, "threads")
         layout.column(heading="First Bake").prop(self, "check_first")
+        column = layout.column(heading="Several Machines")
+        column.prop(self, "farm_command")
+        column.prop(self, "spool_folder")
 
 
 class Defaults:
@@ -59,6 +74,8 @@ class Defaults:
     memory_limit = 0.0
     threads = 0
     check_first = True
+    farm_command = ""
+    spool_folder = ""
 
 
 def preferences(context: bpy.types.Context) -> Any:

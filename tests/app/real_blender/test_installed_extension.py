@@ -102,6 +102,25 @@ def test_exit_codes_come_through_blender(installed: Installed, cornell_blend: Pa
     assert "/proc/radiosity" in unwritable.stdout
 
 
+def test_workers_run_in_blenders_python(installed: Installed, cornell_blend: Path) -> None:
+    """Those that a bake starts, and those of the command: both find the extension and its wheels."""
+    ended = installed.answer("start_local_worker.py", installed.folder / "one-worker")
+    assert ended == {"code": 0, "said": "exit code 0"}
+    bake = ["-b", cornell_blend, "--command", "radiosity", "bake", "--resolution", "192"]
+    bake += ["--quality", "sketch", "--no-preview", "--quiet", "--output"]
+    alone, shared, spool = (installed.folder / name for name in ("alone", "shared", "shared-by"))
+    assert installed.run(*bake, alone).returncode == 0
+    done = installed.run(*bake, shared, "--farm", "local:2", "--spool", spool)
+    assert done.returncode == 0, done.stdout
+    assert (alone / "lightmap.exr").read_bytes() == (shared / "lightmap.exr").read_bytes()
+    report = json.loads((shared / "report.json").read_text())
+    assert not [each for each in report["warnings"] if each["name"] == "workers"]
+    assert report["performance"]["shared"]
+    done = installed.run("-b", "--command", "radiosity", "worker", spool)
+    assert done.returncode == 0, done.stdout
+    assert "0 tasks done" in done.stdout
+
+
 def _lit_mean(path: Path) -> np.ndarray:
     """Mean color of the texels that hold light, (3,)."""
     image = bpy.data.images.load(str(path))

@@ -1,0 +1,114 @@
+"""The commands of those who help with a bake: `worker` and `status`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..base import RadiosityError
+from ..numerics import thread_count
+from .local_workers import LOOK, LocalWorkers
+from .signs import BakeWatch
+from .spool import Spool
+from .status import status_lines
+from .worker import wait_for, work
+
+IDLE = 3600.0
+"""Seconds after which a worker that finds nothing to do ends."""
+
+
+def main(argv: Sequence[str] | None = None, prog: str = "python -m radiosity_addon.farm") -> int:
+    """Run one command and return its exit code."""
+    try:
+        request = _parser(prog).parse_args(argv)
+        if request.verb == "status":
+            _say("\n".join(status_lines(Spool.to_work(request.spool))))
+            return 0
+        wait_for(request.spool, request.wait)
+        spool = Spool.to_work(request.spool)
+        if request.processes is not None:
+            return _work_in_processes(spool, request.processes)
+        idle = math.inf if request.with_bake else request.idle
+        _say(f"{work(spool, idle, _say, with_bake=request.with_bake)} tasks done")
+    except RadiosityError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return error.exit_code
+    except SystemExit as refused:  # or help was asked for
+        return int(refused.code or 0)
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _parser(prog: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=prog, description="Share bakes.", allow_abbrev=False)
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    worker = verbs.add_parser(
+        "worker", help="do tasks of a bake with --spool DIR until it has ended", allow_abbrev=False
+    )
+    worker.add_argument("spool", type=Path, metavar="DIR")
+    worker.add_argument(
+        "--wait", type=_seconds, default=0.0, metavar="SECONDS", help="wait so long for the spool (default 0)"
+    )
+    worker.add_argument(
+        "--idle",
+        type=_seconds,
+        default=IDLE,
+        metavar="SECONDS",
+        help=f"end after so long without work (default {IDLE:.0f})",
+    )
+    worker.add_argument(
+        "--with-bake",
+        action="store_true",
+        help="end also when the bake is interrupted or killed, and not for want of work",
+    )
+    worker.add_argument(
+        "--processes",
+        type=_count,
+        metavar="N",
+        help="start N workers with --with-bake, 0 for one on each core, and end when they do",
+    )
+    status = verbs.add_parser("status", help="show what is done", allow_abbrev=False)
+    status.add_argument("spool", type=Path, metavar="DIR")
+    return parser
+
+
+def _seconds(word: str) -> float:
+    """Read a time. Raises ArgumentTypeError if it is none."""
+    try:
+        seconds = float(word)
+    except ValueError:
+        seconds = math.nan
+    if not seconds >= 0:
+        raise argparse.ArgumentTypeError(f"'{word}' is no number of seconds")
+    return seconds
+
+
+def _count(word: str) -> int:
+    """Read a number of processes. Raises ArgumentTypeError if it is none."""
+    if not (word.isascii() and word.isdecimal() and len(word) < 5):
+        raise argparse.ArgumentTypeError(f"'{word}' is no number of processes")
+    return int(word)
+
+
+def _work_in_processes(spool: Spool, count: int) -> int:
+    """Have some workers until the bake is over or gone; return 1 if one of them was given up."""
+    workers, watch = LocalWorkers(thread_count(count)), BakeWatch(spool.sign)
+    workers.start(spool)
+    try:
+        while not spool.is_over() and not watch.is_gone():
+            time.sleep(LOOK)
+    finally:
+        workers.end()
+    for problem in workers.problems:
+        sys.stderr.write(f"error: {problem}\n")
+    return int(bool(workers.problems))
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
