@@ -32,8 +32,8 @@ BENCHMARKS = {"office": "interior"}
 """The case in which a room is compared with Cycles, where it has another name."""
 
 HEAD = """\
-| room | | used | texels/m | unwrap | rasterize | solve | light | whole bake | memory | error | apart |
-|---|---|---|---|---|---|---|---|---|---|---|---|"""
+| room | | used | texels/m | unwrap | rasterize | solve | light | whole bake | memory | error | apart | best |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
 def costs_of(output: Path) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def costs_of(output: Path) -> dict[str, Any]:
 def table(costs: dict[str, Any]) -> str:
     """Return the table as Markdown."""
     rows = [
-        _row(title, when, costs[name][when], _errors(name) if when == AFTER else ("", ""))
+        _row(title, when, costs[name][when], _errors(name) if when == AFTER else ("", "", ""))
         for name, title in TITLES.items()
         for when in (BEFORE, AFTER)
         if when in costs.get(name, {})
@@ -63,7 +63,7 @@ def table(costs: dict[str, Any]) -> str:
     return "\n".join([HEAD, *rows])
 
 
-def _row(title: str, when: str, cost: dict[str, Any], errors: tuple[str, str]) -> str:
+def _row(title: str, when: str, cost: dict[str, Any], errors: tuple[str, str, str]) -> str:
     density, own = cost["texels_per_meter"], cost["own_texels"]
     cells = [
         title if when == BEFORE else "",
@@ -78,15 +78,15 @@ def _row(title: str, when: str, cost: dict[str, Any], errors: tuple[str, str]) -
     return f"| {' | '.join(cells)} |"
 
 
-def _errors(name: str) -> tuple[str, str]:
-    """Return a room's error at draft quality, and that without coincident faces."""
+def _errors(name: str) -> tuple[str, str, str]:
+    """Return a room's error at draft quality, and those without coincident faces and the worst texels."""
     path = RESULTS / f"{BENCHMARKS.get(name, name)}.json"
     if not path.is_file():
-        return "–", "–"
+        return "–", "–", "–"
     bakes = json.loads(path.read_text(encoding="utf-8"))["ours"]
     (draft,) = (bake for bake in bakes if bake["settings"] == {"quality": "draft"})
-    apart = draft.get("without_coincident")
-    return f"{draft['error']:.1%}", "–" if apart is None else f"{apart:.1%}"
+    error, apart, best = (draft.get(key) for key in ("error", "without_coincident", "without_worst_01"))
+    return f"{error:.1%}", "–" if apart is None else f"{apart:.1%}", f"{best:.1%}"
 
 
 def page_with_table(page: str, costs: dict[str, Any]) -> str:
