@@ -20,7 +20,7 @@ from ..lightmap.texels import TexelGeometry
 from ..lightmap.transport import TexelLight
 from ..numerics import Array, Stream, cosine_hemisphere, stratified_square, tiles, to_world
 from ..rays import NO_HIT
-from ..scene import BakeObject, BakeScene, Scene, closed_parts, inside_out, places
+from ..scene import BakeObject, BakeScene, Scene, inside_out, places, wound_parts
 from ..solver import Solution
 from ..solver.gather import Footprints, LocalPass
 
@@ -40,9 +40,8 @@ PROBED, PROBES = 64, 16
 OPEN = 0.5
 """A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
 
-MOSTLY = 0.9
-"""Where so much of what is lit of a connected part is turned, what gets no light on either side is too:
-the wall behind a cupboard."""
+MOSTLY = 0.5
+"""A part whose faces go on facing one way is turned if so much of what is lit of it is: all of it, or nothing."""
 
 NO_AREA = 1e-12
 """Triangles without area count as so much of the largest: polygons of nothing else follow their part."""
@@ -144,14 +143,15 @@ def turned_away(
         distinct, count = np.unique(np.minimum(chosen, len(suspects) - 1), return_counts=True)
         share *= float(count @ probe.lit(suspects[distinct], SEEN * usual)) / PROBED
         if share > MAX_TURNED_SHARE:
-            message = (
-                f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
-                "away from the light, so its lightmap is dark there; flip them (Flip Faces in the panel, or "
-                "Mesh → Normals → Flip) if that side should be visible"
-            )
             turned = suspects[probe.all_lit(suspects, SEEN * usual)] - item.first
             unlit = lit[item.rows] <= SEEN * usual
             polygons = turned_polygons(item, scene.triangles[item.rows], area, turned, unlit)
+            ways = "Flip Faces in the panel, or Mesh → Normals → Flip" if polygons else "Mesh → Normals → Flip"
+            message = (
+                f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
+                f"away from the light, so its lightmap is dark there; flip them ({ways}) if that side should "
+                "be visible"
+            )
             found.append((share * float(area.sum()), BakeWarning(item.name, message, turned=polygons)))
     for _, warning in sorted(found, key=lambda each: -each[0]):
         yield warning
@@ -162,19 +162,20 @@ def turned_polygons(
 ) -> tuple[int, ...]:
     """Return the polygons of an object that are to be flipped, in ascending order.
 
+    Parts whose faces go on facing one way stay so: each is flipped as a whole, or not at all.
+
     triangles (count, 3, 3), areas (count,) [m²]: The object's.
     turned (n,) int: Its triangles that are lit from behind only.
-    unlit (count,) bool: Those that get hardly any light on either side: they follow the part they are in.
+    unlit (count,) bool: Those that get hardly any light on either side, and so decide nothing.
     """
     is_turned = np.zeros(item.count, dtype=bool)
     is_turned[turned] = True
-    part, _ = closed_parts(places(triangles))
+    part = wound_parts(places(triangles))
     of_part = np.bincount(part, areas * is_turned)
     decided = np.bincount(part, areas * (is_turned | ~unlit))
-    mostly = (of_part > 0) & (of_part >= MOSTLY * decided)
-    is_turned |= unlit & mostly[part]
+    flips = ((of_part > 0) & (of_part >= MOSTLY * decided))[part]
     weight = np.maximum(areas, NO_AREA * areas.max())
-    most = np.bincount(item.polygon, weight * is_turned) > 0.5 * np.bincount(item.polygon, weight)
+    most = np.bincount(item.polygon, weight * flips) > 0.5 * np.bincount(item.polygon, weight)
     return tuple(np.flatnonzero(most).tolist())
 
 

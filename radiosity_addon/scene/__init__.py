@@ -6,7 +6,7 @@ Also which of several surfaces in one place counts, and rays that pass through c
 from __future__ import annotations
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene, LevelOfDetail
-from .closed_solids import closed_parts, places, sealed_backs
+from .closed_solids import closed_parts, places, sealed_backs, wound_parts
 from .coincident_faces import coincident_triangles
 from .faces import Faces
 from .inside_out_parts import inside_out
@@ -39,4 +39,5 @@ __all__ = [
     "shares",
     "texture_digest",
     "where_there",
+    "wound_parts",
 ]

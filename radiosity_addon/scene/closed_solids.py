@@ -79,14 +79,7 @@ def closed_parts(places: Array) -> tuple[Array, Array]:
     solids that touch are two.
     """
     count = len(places)
-    start, end = places.ravel(), np.roll(places, -1, axis=1).ravel()
-    forward = start < end
-    key = np.where(forward, start, end) * (int(places.max()) + 1) + np.where(forward, end, start)
-    # Edges of triangles without width that lead nowhere cancel by themselves.
-    edges = np.flatnonzero(start != end)
-    edges = edges[np.argsort(key[edges], kind="stable")]
-    first = np.flatnonzero(np.diff(key[edges], prepend=-1))
-    length = np.diff(first, append=len(edges))
+    forward, edges, first, length = _meeting_edges(places)
     pairs = first[length == 2]
     one, other = edges[pairs] // 3, edges[pairs + 1] // 3
     label = np.unique(connected_components(count, one, other), return_inverse=True)[1]
@@ -105,6 +98,35 @@ def closed_parts(places: Array) -> tuple[Array, Array]:
         sums = np.add.reduceat(np.where(forward[rest][order], 1, -1), begins)
         is_closed[of_part[begins[sums != 0]]] = False
     return label, is_closed
+
+
+def wound_parts(places: Array) -> Array:
+    """Return (t,) the part of the surface that each triangle is in: parts end where neighbors face opposite ways.
+
+    places (t, 3) int: Of the corners.
+    """
+    forward, edges, first, length = _meeting_edges(places)
+    pairs = first[length == 2]
+    pairs = pairs[forward[edges[pairs]] != forward[edges[pairs + 1]]]
+    joined = connected_components(len(places), edges[pairs] // 3, edges[pairs + 1] // 3)
+    return np.asarray(np.unique(joined, return_inverse=True)[1])
+
+
+def _meeting_edges(places: Array) -> tuple[Array, Array, Array, Array]:
+    """Return the edges of triangles (t, 3), sorted so that equal ones lie together.
+
+    Returns forward (3 t,) bool: Whether each edge goes from the smaller to the larger place.
+    Returns edges (e,) int: Their numbers; the triangle is a third.
+    Returns first, length (k,) int: Where each run of equal ones starts, and how many they are.
+    """
+    start, end = places.ravel(), np.roll(places, -1, axis=1).ravel()
+    forward = start < end
+    key = np.where(forward, start, end) * (int(places.max()) + 1) + np.where(forward, end, start)
+    # Edges of triangles without width that lead nowhere cancel by themselves.
+    edges = np.flatnonzero(start != end)
+    edges = edges[np.argsort(key[edges], kind="stable")]
+    first = np.flatnonzero(np.diff(key[edges], prepend=-1))
+    return forward, edges, first, np.diff(first, append=len(edges))
 
 
 def boxes_of(corners: Array, group: Array, count: int) -> Array:

@@ -10,6 +10,7 @@ import pytest
 from radiosity_addon.bake.turned_faces import BackProbe, turned_away, turned_polygons
 from radiosity_addon.lights import EnvironmentLight, SunLight
 from radiosity_addon.numerics import triangle_areas
+from radiosity_addon.scene import places, wound_parts
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.rooms import box_room, gray_scene, rectangle, solid_box
@@ -128,27 +129,25 @@ def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_s
     assert [warning.name for warning in turned_away(many, scene, front, back, probe)] == ["Closet"]
 
 
-def test_what_gets_no_light_turns_with_the_part_that_it_is_in() -> None:
-    """Polygons are turned by most of their area; what is lit in front never is."""
+def test_parts_are_turned_as_a_whole_or_not_at_all() -> None:
+    """What is lit decides, by its area; a part ends where neighbors face opposite ways."""
     wall = rectangle((0, 0, 0), (4, 0, 0), (0, 0, 4), 4)
-    other = rectangle((9, 0, 0), (1, 0, 0), (0, 0, 1), 4)
-    polygon = np.concatenate([np.tile(np.arange(16), 2), 16 + np.arange(32) // 2])
-    item = replace(bake_object("Walls", 0, 64), polygon=polygon)
-    is_turned, unlit = np.zeros(64, dtype=bool), np.zeros(64, dtype=bool)
-    is_turned[:32] = True
-    is_turned[[0, 5, 6, 22]] = False
-    unlit[[0, 5]] = True
-    unlit[32:] = True
+    dark = rectangle((9, 0, 0), (1, 0, 0), (0, 0, 1), 4)
+    beside = rectangle((4, 0, 0), (4, 0, 0), (0, 0, 4), 4)[:, ::-1]
+    triangles = np.concatenate([wall, dark, beside])
+    polygon = np.concatenate([np.tile(np.arange(16), 2), 16 + np.arange(32) // 2, 32 + np.arange(32)])
+    item = replace(bake_object("Walls", 0, 96), polygon=polygon)
+    unlit = np.zeros(96, dtype=bool)
+    unlit[[0, 5]] = unlit[32:64] = True
+    lit = np.setdiff1d(np.arange(32), [0, 5])
 
-    def found(rows: np.ndarray) -> tuple[int, ...]:
-        triangles = np.concatenate([wall, other])
-        return turned_polygons(item, triangles, triangle_areas(triangles), np.flatnonzero(rows), unlit)
+    def found(lit_behind: int) -> tuple[int, ...]:
+        return turned_polygons(item, triangles, triangle_areas(triangles), lit[:lit_behind], unlit)
 
-    # 6 and 22 are a polygon that is lit in front; 0 and 5 are each half of one, and behind a cupboard.
-    assert found(is_turned) == (*range(6), *range(7, 16))
-    # As soon as more of the wall is lit in front, they stay.
-    is_turned[[7, 23]] = False
-    assert found(is_turned) == (*range(1, 5), *range(8, 16))
+    assert found(30) == found(15) == tuple(range(16))
+    assert found(14) == ()
+    # Faces that face the other way are a part of their own, though they go on where the wall ends.
+    assert np.bincount(wound_parts(places(triangles))).tolist() == [32, 32, 32]
 
 
 def test_without_light_nothing_is_turned_away() -> None:
