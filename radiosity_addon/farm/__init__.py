@@ -11,7 +11,7 @@ from .executor import shared_bake
 from .farm_command import FarmCommand
 from .helpers import Helpers
 from .local_workers import LocalWorkers
-from .output_spool import own_spool, shared_in_folder
+from .output_spool import given_spool, own_spool, shared_in_folder
 from .records import ShareRecord
 from .spool import Spool
 
@@ -22,6 +22,7 @@ __all__ = [
     "LocalWorkers",
     "ShareRecord",
     "Spool",
+    "given_spool",
     "own_spool",
     "run_command",
     "shared_bake",

@@ -1,4 +1,4 @@
-"""Spools that a bake makes for itself: next to where its files go, or in a folder for spools."""
+"""Spools of a bake: in a folder that is given, next to where its files go, or in a folder for spools."""
 
 from __future__ import annotations
 
@@ -25,6 +25,24 @@ FORGOTTEN = 86400.0
 
 
 @contextmanager
+def given_spool(path: Path) -> Iterator[Spool]:
+    """Yield a spool to bake with in a folder; after an error nothing is left there, unless it holds results.
+
+    Raises BakeError as `Spool.to_bake` does.
+    """
+    was_there = path.exists()
+    spool = Spool.to_bake(path)
+    try:
+        with _kept_with_results(spool):
+            yield spool
+    except BaseException:
+        if was_there:
+            with suppress(OSError):
+                spool.path.mkdir(exist_ok=True)
+        raise
+
+
+@contextmanager
 def own_spool(output: Path) -> Iterator[Spool]:
     """Yield a spool for the bake into a folder, which is removed if the bake ends well.
 
@@ -34,8 +52,16 @@ def own_spool(output: Path) -> Iterator[Spool]:
     """
     output = output.expanduser().resolve()
     spool = Spool.of_output(output.parent / (output.name + ENDING), output)
-    try:
+    with _kept_with_results(spool):
         yield spool
+    spool.remove()
+
+
+@contextmanager
+def _kept_with_results(spool: Spool) -> Iterator[None]:
+    """Remove a spool after an error, unless a bake can go on with it: then the error says so."""
+    try:
+        yield
     except BaseException as error:
         if spool.has_results():
             error.add_note(f"what was computed is kept in '{spool.path}': the same command goes on with it")
@@ -43,19 +69,27 @@ def own_spool(output: Path) -> Iterator[Spool]:
         else:
             spool.remove()
         raise
-    spool.remove()
 
 
 @contextmanager
 def shared_in_folder(folder: Path, helpers: Helpers) -> Iterator[ShareRecord]:
     """Share what is baked within through a new spool in a folder, which is removed however the bake ends.
 
-    What bakes that were killed have left in the folder is removed as well.
-    Raises BakeError if the spool cannot be written to.
+    What bakes that were killed have left in the folder is removed as well. If no spool can be made there, the
+    bake goes on alone, and the record says why.
+    Raises BakeError if the spool cannot be written to later.
     """
     folder = folder.resolve()
     _remove_forgotten(folder)
-    spool = Spool.to_bake(folder / f"{PREFIX}{secrets.token_hex(8)}", made_for=folder)
+    path = folder / f"{PREFIX}{secrets.token_hex(8)}"
+    try:
+        spool = Spool.to_bake(path, made_for=folder)
+    except BakeError as error:
+        Spool(path).remove()
+        alone = ShareRecord()
+        alone.problems.append(f"{error}; the bake went on alone")
+        yield alone
+        return
     try:
         with shared_bake(spool, helpers) as record:
             yield record

@@ -70,6 +70,8 @@ class Spool:
         """
         spool = cls(path)
         with _explained(spool.path):
+            if spool.path.exists() and not spool.path.is_dir():
+                raise BakeError(f"'{spool.path}' is no folder: give an empty folder")
             spool.path.mkdir(parents=True, exist_ok=True)
             record = spool.path / "spool.json"
             if not record.exists():
@@ -402,5 +404,5 @@ def _explained(path: Path) -> Iterator[None]:
 def _full(path: Path, error: OSError) -> BakeError:
     why = error.strerror or "its disk may be full"  # NumPy tells no more
     return BakeError(
-        f"cannot write to spool '{path}': {why}; see to it and start again: what is done is kept"
+        f"cannot write to spool '{path}': {why}; see to it and start again"
     )

@@ -247,7 +247,7 @@ def test_a_full_disk_is_one_line_and_what_is_done_stays(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", full)
-        with pytest.raises(BakeError, match=r"cannot write to spool .*: No space left on device; .* is kept"):
+        with pytest.raises(BakeError, match=r"cannot write to spool .*: No space left on device; see to it"):
             baked_bytes(ROOMS[name](), tmp_path)
     assert list(tmp_path.glob("calls/*/*.result"))
     assert baked_bytes(ROOMS[name](), tmp_path) == alone
@@ -269,6 +269,49 @@ def test_a_folder_of_other_things_is_refused_before_the_bake(
     assert main(["bake", "--output", str(tmp_path / "out"), "--spool", str(tmp_path)]) == 1
     assert capsys.readouterr().err.strip().endswith("is not empty and no spool: give an empty folder")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["thesis.txt"]
+
+
+def test_a_file_is_no_spool(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    words = ["bake", "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "thesis.txt")]
+    assert main(words) == 1
+    assert capsys.readouterr().err.strip().endswith("thesis.txt' is no folder: give an empty folder")
+    assert (tmp_path / "thesis.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("was_there", [False, True])
+def test_an_error_before_the_first_result_leaves_no_spool(was_there: bool, tmp_path: Path) -> None:
+    """Workers would wait at it for a bake that is not there."""
+    if was_there:
+        (tmp_path / "spool").mkdir()
+    words = ["bake", "--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
+    assert main([*words, "--objects", "Nobody"]) == 2
+    assert [path.name for path in tmp_path.rglob("*")] == (["spool"] if was_there else [])
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no such users here")
+def test_after_a_full_disk_the_command_line_says_what_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["bake", "--resolution", "256", "--quality", "sketch", "--no-preview", "--quiet"]
+    words += ["--output", str(tmp_path / "out"), "--spool", str(tmp_path / "spool")]
+    put_result, count = Spool.put_result, 0
+
+    def full(self: Spool, *found: Any) -> None:
+        nonlocal count
+        count += 1
+        if count > 3:
+            raise BakeError(f"cannot write to spool '{self.path}'")
+        put_result(self, *found)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Spool, "put_result", full)
+        assert main(words) == 1
+    said = capsys.readouterr().err
+    assert f"what was computed is kept in '{tmp_path / 'spool'}'" in said
+    assert said.count("kept") == 1
+    assert list((tmp_path / "spool").glob("calls/*/*.result"))
+    assert main(words) == 0
 
 
 @pytest.mark.parametrize("flag", ["--relight", "--check"])

@@ -115,6 +115,32 @@ def test_a_relative_folder_is_refused(preferred: SimpleNamespace) -> None:
             farm_of(bpy.context)
 
 
+def test_a_folder_that_is_not_there_is_refused(preferred: SimpleNamespace, tmp_path: Path) -> None:
+    """A share that is not mounted: its name would be that of a folder on this machine."""
+    (tmp_path / "file").write_text("mine")
+    for name in ("gone", "file", "file/below"):
+        preferred.spool_folder = str(tmp_path / name)
+        with pytest.raises(BakeError, match="is no folder: make it, or mount it"):
+            farm_of(bpy.context)
+    assert not (tmp_path / "gone").exists()
+
+
+def test_where_no_spool_can_be_made_the_bake_goes_on_alone(
+    room: Path, preferred: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    to_bake = Spool.to_bake
+
+    def full(path: Path, made_for: Path | None = None) -> Spool:
+        to_bake(path, made_for)
+        raise BakeError("cannot write to spool")
+
+    monkeypatch.setattr(Spool, "to_bake", full)
+    assert bpy.ops.radiosity.bake() == {"FINISHED"}
+    assert of_workers(room) == ["cannot write to spool; the bake went on alone"]
+    assert list(Path(preferred.spool_folder).iterdir()) == []
+    assert not preferred.note.exists()
+
+
 @pytest.mark.parametrize(
     ("command", "says"),
     [

@@ -14,7 +14,7 @@ from ...bake import KeepOptions
 from ...bake.result import write_history
 from ...base import BakeWarning, SceneError, Status, UsageError
 from ...cli import Console, FarmSpec, Interrupts, Permissions, summary
-from ...farm import DaskWorkers, Helpers, LocalWorkers, Spool, own_spool, shared_bake
+from ...farm import DaskWorkers, Helpers, LocalWorkers, given_spool, own_spool, shared_bake
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -97,9 +97,9 @@ def bake(
         if form is not None:
             check_export(output, form, settings.quantity, allowed)
         keeping = KeepOptions(sidecar=True) if keep else None
-        shared = None if spool is None else Spool.to_bake(spool)
-        if shared is None and farm is not None:
-            shared = stack.enter_context(own_spool(output))
+        shared = None
+        if spool is not None or farm is not None:
+            shared = stack.enter_context(own_spool(output) if spool is None else given_spool(spool))
         job = run_bake(
             bpy.context,
             settings,

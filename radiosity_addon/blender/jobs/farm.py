@@ -17,7 +17,7 @@ from .job import Sharing
 def farm_of(context: bpy.types.Context) -> tuple[FarmCommand | None, Sharing | None]:
     """Return the command that the preferences give, and how a bake is shared; nothing if they do not.
 
-    Raises BakeError if the folder for spools is none.
+    Raises BakeError if there is no such folder for spools.
     """
     chosen = preferences(context)
     command, folder = chosen.farm_command.strip(), chosen.spool_folder.strip()
@@ -26,6 +26,8 @@ def farm_of(context: bpy.types.Context) -> tuple[FarmCommand | None, Sharing | N
     place = Path(bpy.path.abspath(folder)).expanduser()
     if not place.is_absolute() or (folder.startswith("//") and not bpy.data.filepath):
         raise BakeError(f"Spool Folder '{folder}' in the preferences: give the whole path")
+    if not place.is_dir():
+        raise BakeError(f"Spool Folder '{folder}' in the preferences is no folder: make it, or mount it")
     started = FarmCommand(command)
     return started, partial(shared_in_folder, place, started)
 
