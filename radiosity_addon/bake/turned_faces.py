@@ -41,7 +41,7 @@ OPEN = 0.5
 """A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
 
 MOSTLY = 0.5
-"""A part whose faces go on facing one way is turned if so much of what is lit of it is: all of it, or nothing."""
+"""A part whose faces go on facing one way is turned, as a whole, if so much of what is lit of it is."""
 
 NO_AREA = 1e-12
 """Triangles without area count as so much of the largest: polygons of nothing else follow their part."""
@@ -146,7 +146,7 @@ def turned_away(
             turned = suspects[probe.all_lit(suspects, SEEN * usual)] - item.first
             unlit = lit[item.rows] <= SEEN * usual
             polygons = turned_polygons(item, scene.triangles[item.rows], area, turned, unlit)
-            ways = "Flip Faces in the panel, or Mesh → Normals → Flip" if polygons else "Mesh → Normals → Flip"
+            ways = "Flip Faces in the panel, or " * bool(polygons) + "Mesh → Normals → Flip"
             message = (
                 f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
                 f"away from the light, so its lightmap is dark there; flip them ({ways}) if that side should "

@@ -101,7 +101,7 @@ def closed_parts(places: Array) -> tuple[Array, Array]:
 
 
 def wound_parts(places: Array) -> Array:
-    """Return (t,) the part of the surface that each triangle is in: parts end where neighbors face opposite ways.
+    """Return (t,) the part of each triangle: parts end where neighbors face opposite ways.
 
     places (t, 3) int: Of the corners.
     """

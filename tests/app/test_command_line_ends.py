@@ -182,15 +182,20 @@ def copied(baked: Baked, to: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-@pytest.mark.parametrize("stage", ["export", "solve", "light", "preview"])
-def test_ctrl_c_leaves_the_previous_result_whole(stage: str, baked: Baked, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("stage", "number"),
+    [*((stage, signal.SIGINT) for stage in ("export", "solve", "light", "preview")), ("light", signal.SIGTERM)],
+)
+def test_ctrl_c_leaves_the_previous_result_whole(
+    stage: str, number: signal.Signals, baked: Baked, tmp_path: Path
+) -> None:
     room, out = copied(baked, tmp_path)
     before = digest(out)
     words = ("--resolution", "64", "--quality", "draft")
     job = start("bake", room, "--output", out, *words, cwd=tmp_path)
     for line in job.stdout:
         if f"] {stage}" in line:
-            os.killpg(job.pid, signal.SIGINT)
+            os.killpg(job.pid, number)
             break
     _, err = job.communicate(timeout=300)
     assert job.returncode == 130

@@ -255,22 +255,23 @@ def test_a_defect_of_ours_shows_its_traceback(verbs: list[tuple], capsys: pytest
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 @pytest.mark.parametrize("swallow", [RuntimeError, SceneError])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_that_a_callback_swallows_still_ends_in_130(
-    swallow: type[Exception], verbs: list[tuple]
+    number: signal.Signals, swallow: type[Exception], verbs: list[tuple]
 ) -> None:
     def bake(*args: object, **_more: object) -> None:
         args[-1].deferred = False
         try:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
         except KeyboardInterrupt as stop:
             if swallow is SceneError:
                 raise SceneError("the importer failed") from stop
         args[-1].check()
 
     sys.modules[VERBS].bake = bake
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(number)
     assert main(["bake"]) == 130
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(number) is before
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
