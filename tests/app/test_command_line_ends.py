@@ -184,7 +184,7 @@ def copied(baked: Baked, to: Path) -> tuple[Path, Path]:
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 @pytest.mark.parametrize(
     ("stage", "number"),
-    [*((stage, signal.SIGINT) for stage in ("export", "solve", "light", "preview")), ("light", signal.SIGTERM)],
+    [*((name, signal.SIGINT) for name in ("export", "solve", "light", "preview")), ("light", signal.SIGTERM)],
 )
 def test_ctrl_c_leaves_the_previous_result_whole(
     stage: str, number: signal.Signals, baked: Baked, tmp_path: Path
