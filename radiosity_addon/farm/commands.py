@@ -24,7 +24,7 @@ IDLE = 3600.0
 def main(argv: Sequence[str] | None = None, prog: str = "python -m radiosity_addon.farm") -> int:
     """Run one command and return its exit code."""
     try:
-        request = _parser(prog).parse_args(argv)
+        request = build_parser(prog).parse_args(argv)
         if request.verb == "status":
             _say("\n".join(status_lines(Spool.to_work(request.spool))))
             return 0
@@ -44,7 +44,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m radiosity_add
     return 0
 
 
-def _parser(prog: str) -> argparse.ArgumentParser:
+def build_parser(prog: str) -> argparse.ArgumentParser:
+    """Return what reads a command; `prog` is how it is called."""
     parser = argparse.ArgumentParser(prog=prog, description="Share bakes.", allow_abbrev=False)
     verbs = parser.add_subparsers(dest="verb", required=True)
     worker = verbs.add_parser(

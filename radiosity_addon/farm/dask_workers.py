@@ -29,12 +29,13 @@ GRACE = 10.0
 class DaskWorkers:
     """As many workers as the cluster has threads; see `Helpers`.
 
+    futures: One for each worker, as long as they work.
     Raises BakeError if `distributed` is not installed, or the scheduler does not answer.
     """
 
     def __init__(self, scheduler: str) -> None:
         self.problems: list[str] = []
-        self._futures: list[Any] = []
+        self.futures: list[Any] = []
         try:
             self._dask = importlib.import_module("distributed")
         except ImportError as error:
@@ -51,11 +52,11 @@ class DaskWorkers:
         """See `Helpers`."""
         threads = sum(self._client.nthreads().values())
         paths = [str(spool.path)] * max(threads, 1)
-        self._futures = self._client.map(help_bake, paths, pure=False, retries=RETRIES)
+        self.futures = self._client.map(help_bake, paths, pure=False, retries=RETRIES)
 
     def end(self) -> None:
         """See `Helpers`."""
-        futures, self._futures = self._futures, []
+        futures, self.futures = self.futures, []
         try:
             if futures:
                 self._wait(futures)

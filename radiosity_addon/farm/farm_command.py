@@ -17,12 +17,13 @@ class FarmCommand:
     """Runs a command once, without a shell, and ends it with the bake; see `Helpers`.
 
     command: Its words, as a shell would have them; `{spool}` in them stands for the spool's folder.
+    process: As long as it has been started and not been ended.
     """
 
     def __init__(self, command: str) -> None:
         self.problems: list[str] = []
         self._command = command
-        self._process: HelpingProcess | None = None
+        self.process: HelpingProcess | None = None
         self._ended, self._lock = False, Lock()
 
     def start(self, spool: Spool) -> None:
@@ -31,7 +32,7 @@ class FarmCommand:
             words = [word.replace(SPOOL, str(spool.path)) for word in split(self._command)]
             with self._lock:
                 if words and not self._ended:
-                    self._process = HelpingProcess(words)
+                    self.process = HelpingProcess(words)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             self.problems.append(f"the farm command cannot be started: {why}; the bake went on alone")
@@ -40,7 +41,7 @@ class FarmCommand:
         """See `Helpers`; may be called at any time, by another thread, and again."""
         with self._lock:
             self._ended = True
-            process, self._process = self._process, None
+            process, self.process = self.process, None
             if process is None:
                 return
             if process.code:

@@ -70,6 +70,15 @@ def digest_of(text: str) -> str:
     return hashlib.blake2b(text.encode(), digest_size=20).hexdigest()
 
 
+def array_digest(array: Array) -> str:
+    """Return the digest of an array's type, shape and numbers."""
+    array = np.ascontiguousarray(array)
+    digest = hashlib.blake2b(f"{array.dtype.str}{array.shape}".encode(), digest_size=20)
+    if array.size:
+        digest.update(array.reshape(-1).view(np.uint8).data)
+    return digest.hexdigest()
+
+
 class Writer:
     """Writes a value, and the objects and arrays it holds, to a store."""
 

@@ -17,7 +17,6 @@ found, and made again, so nothing has to be synced. Running a task twice does no
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import re
 import uuid
@@ -31,7 +30,7 @@ import numpy.typing as npt
 from ..base import BakeError
 from ..numerics import ArrayFileError, read_arrays, write_arrays
 from .identity import identity
-from .objects import KINDS, ObjectError, digest_of
+from .objects import KINDS, ObjectError, array_digest, digest_of
 from .recent import Recent
 from .signs import refuse_second_bake, take_away, this_process
 
@@ -382,15 +381,6 @@ class Spool:
                 with contextlib.suppress(OSError):
                     aside.unlink()
                 raise
-
-
-def array_digest(array: Array) -> str:
-    """Return the digest of an array's type, shape and numbers."""
-    array = np.ascontiguousarray(array)
-    digest = hashlib.blake2b(f"{array.dtype.str}{array.shape}".encode(), digest_size=20)
-    if array.size:
-        digest.update(array.reshape(-1).view(np.uint8).data)
-    return digest.hexdigest()
 
 
 @contextlib.contextmanager

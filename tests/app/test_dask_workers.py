@@ -17,10 +17,10 @@ import pytest
 from radiosity_addon.base import BakeError
 from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.farm import DaskWorkers, Spool
+from tests.moments import until
 from tests.processes import ROOT
 
 from .test_local_workers import BAKE, WAITING_BAKE, alone, claimants, each_call
-from .test_shared_bakes import until
 
 __all__ = ["alone"]
 
@@ -101,7 +101,7 @@ def test_workers_of_another_version_are_refused(
     monkeypatch.setattr(DaskWorkers, "start", start_in_another_version)
     each_call(
         monkeypatch,
-        lambda *_: until(lambda: all(each.status == "error" for each in started[0]._futures)),
+        lambda *_: until(lambda: all(each.status == "error" for each in started[0].futures)),
     )
     assert main(words(tmp_path, cluster.scheduler_address)) == 0
     assert (tmp_path / "out" / "lightmap.exr").read_bytes() == alone

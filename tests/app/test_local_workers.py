@@ -16,9 +16,8 @@ from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.farm import LocalWorkers, Spool, local_workers
 from radiosity_addon.farm.processes import HelpingProcess
 from radiosity_addon.farm.signs import this_process
+from tests.moments import until
 from tests.processes import ROOT
-
-from .test_shared_bakes import until
 
 BAKE = ["bake", "--resolution", "256", "--quality", "sketch", "--no-preview", "--quiet", "--threads", "1"]
 

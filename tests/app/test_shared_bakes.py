@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import signal
 import subprocess
@@ -25,6 +24,7 @@ from radiosity_addon.farm.tasks import KERNELS
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from tests.glass_rooms import glazed_room
+from tests.moments import until, waits_for_a_worker
 from tests.moved_rooms import room
 from tests.processes import ROOT
 
@@ -36,7 +36,8 @@ BAKE = """
 import sys
 from pathlib import Path
 from radiosity_addon.farm import executor
-from tests.app.test_shared_bakes import baked_bytes, ends_after, waits_for_a_worker, ROOMS
+from tests.app.test_shared_bakes import baked_bytes, ROOMS
+from tests.moments import ends_after, waits_for_a_worker
 spool, name, kernel, results = sys.argv[1:]
 if kernel:
     # A small room's calls have few slices.
@@ -51,7 +52,7 @@ DYING_WORKER = """
 import sys
 from pathlib import Path
 from radiosity_addon.farm.__main__ import main
-from tests.app.test_shared_bakes import dies_with_a_task_of
+from tests.moments import dies_with_a_task_of
 spool, kernel = sys.argv[1:]
 dies_with_a_task_of(kernel)
 main(["worker", spool, "--idle", "60"])
@@ -108,58 +109,6 @@ def start_bake(spool: Path, name: str, kernel: str = "", results: int = 0) -> su
     """
     words = [sys.executable, "-c", BAKE, str(spool), name, kernel, str(results)]
     return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-
-
-def waits_for_a_worker(kernel: str = "") -> None:
-    """Have bakes of this process leave their first call of a kernel to workers, until one has claimed a task.
-
-    kernel: Any kernel if empty.
-    """
-    put_call, waited = Spool.put_call, False
-
-    def put_and_wait(self: Spool, text: str) -> str:
-        nonlocal waited
-        digest = put_call(self, text)
-        if not waited and kernel in text:
-            until(lambda: self.claimed(digest) | self.done(digest))
-            waited = True
-        return digest
-
-    Spool.put_call = put_and_wait  # type: ignore[method-assign]
-
-
-def ends_after(results: int) -> None:
-    """Have this process killed when it has written so many results."""
-    put_result, count = Spool.put_result, 0
-
-    def put_and_die(self: Spool, *found: Any) -> None:
-        nonlocal count
-        put_result(self, *found)
-        count += 1
-        if count == results:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-    Spool.put_result = put_and_die  # type: ignore[method-assign]
-
-
-def dies_with_a_task_of(kernel: str) -> None:
-    """Have this process killed as soon as it has claimed a task of a kernel."""
-    claim = Spool.claim
-
-    def claim_and_die(self: Spool, digest: str, task: int) -> bool:
-        claimed = claim(self, digest, task)
-        if claimed and kernel in json.dumps(self.call(digest)):
-            os.kill(os.getpid(), signal.SIGKILL)
-        return claimed
-
-    Spool.claim = claim_and_die  # type: ignore[method-assign]
-
-
-def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])

@@ -159,7 +159,7 @@ def test_a_command_that_fails_is_a_warning(
 
     def start_and_wait(self: FarmCommand, spool: Spool) -> None:
         start(self, spool)
-        until(lambda: self._process is None or self._process.code is not None)
+        until(lambda: self.process is None or self.process.code is not None)
 
     monkeypatch.setattr(FarmCommand, "start", start_and_wait)
     assert bpy.ops.radiosity.bake() == {"FINISHED"}
@@ -205,7 +205,7 @@ def test_a_bake_that_ends_first_starts_nothing(preferred: SimpleNamespace, tmp_p
     command = FarmCommand(preferred.farm_command)
     command.end()
     command.start(Spool.to_bake(tmp_path / "spool"))
-    assert command._process is None
+    assert command.process is None
 
 
 def test_spools_of_bakes_that_were_killed_go_after_a_day(

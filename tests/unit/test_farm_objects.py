@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from radiosity_addon.farm.objects import ObjectError, Reader, Writer, digest_of, name_of, named
-from radiosity_addon.farm.spool import Spool, array_digest
+from radiosity_addon.farm.objects import ObjectError, Reader, Writer, array_digest, digest_of, name_of, named
+from radiosity_addon.farm.spool import Spool
 from radiosity_addon.farm.tasks import KERNELS, is_kernel
 from radiosity_addon.lights import PointLight
 from radiosity_addon.numerics import Scratch, points_at, thread_count

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from radiosity_addon.cli import build_parser
-from radiosity_addon.farm.commands import _parser
+from radiosity_addon.farm import commands
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "docs" / "flamenco" / "radiosity_bake.js"
@@ -84,7 +84,7 @@ def test_all_share_one_spool_next_to_the_output(output: str) -> None:
         assert (command["name"], command["parameters"]["exe"]) == ("exec", "{blender}")
         words = command["parameters"]["args"]
         assert words[:3] == ["--background", "--command", "radiosity"]
-        request = _parser("blender").parse_args(words[3:])
+        request = commands.build_parser("blender").parse_args(words[3:])
         assert (request.verb, str(request.spool), request.processes) == ("worker", spool, 5)
         assert request.wait == 3600
 
