@@ -20,7 +20,7 @@ from radiosity_addon.farm import DaskWorkers, Spool
 from tests.moments import until
 from tests.processes import ROOT
 
-from .test_local_workers import BAKE, WAITING_BAKE, alone, claimants, each_call
+from .test_local_workers import BAKE, WAITING_BAKE, alone, claimants, each_call, kill_workers
 
 __all__ = ["alone"]
 
@@ -71,16 +71,7 @@ def test_a_cluster_gives_the_same_bytes(
 def test_a_process_of_the_cluster_that_is_killed_costs_its_tasks(
     alone: bytes, cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    killed: set[int] = set()
-
-    def kill_who_works(spool: Spool, digest: str) -> None:
-        if len(killed) < 2:
-            until(lambda: claimants(spool, digest) - killed)
-            for number in claimants(spool, digest) - killed:
-                os.kill(number, signal.SIGKILL)
-                killed.add(number)
-
-    each_call(monkeypatch, kill_who_works)
+    killed = kill_workers(monkeypatch, 2)
     assert main(words(tmp_path, cluster.scheduler_address)) == 0
     assert len(killed) >= 2
     assert (tmp_path / "out" / "lightmap.exr").read_bytes() == alone

@@ -81,6 +81,21 @@ def each_call(monkeypatch: pytest.MonkeyPatch, then: Callable[[Spool, str], None
     monkeypatch.setattr(Spool, "put_call", put)
 
 
+def kill_workers(monkeypatch: pytest.MonkeyPatch, count: int) -> set[int]:
+    """Kill who works at each call until so many are killed; return where their numbers are collected."""
+    killed: set[int] = set()
+
+    def kill_who_works(spool: Spool, digest: str) -> None:
+        if len(killed) < count:
+            until(lambda: claimants(spool, digest) - killed)
+            for number in claimants(spool, digest) - killed:
+                os.kill(number, signal.SIGKILL)
+                killed.add(number)
+
+    each_call(monkeypatch, kill_who_works)
+    return killed
+
+
 def waits_to_go() -> None:
     """Have the bake of this process leave its first tasks to workers, until there is a file "go"."""
     each_call(pytest.MonkeyPatch(), lambda spool, _: until((spool.path / "go").exists))
@@ -133,16 +148,7 @@ def test_a_spool_that_was_given_stays(alone: bytes, tmp_path: Path) -> None:
 def test_workers_that_are_killed_are_started_again(
     alone: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    killed: set[int] = set()
-
-    def kill_who_works(spool: Spool, digest: str) -> None:
-        if len(killed) < 3:
-            until(lambda: claimants(spool, digest) - killed)
-            for number in claimants(spool, digest) - killed:
-                os.kill(number, signal.SIGKILL)
-                killed.add(number)
-
-    each_call(monkeypatch, kill_who_works)
+    killed = kill_workers(monkeypatch, 3)
     assert main([*BAKE, "--output", str(tmp_path / "out"), "--farm", "local:1"]) == 0
     assert len(killed) == 3
     assert (tmp_path / "out" / "lightmap.exr").read_bytes() == alone

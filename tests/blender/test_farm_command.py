@@ -6,7 +6,6 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,6 +20,7 @@ from radiosity_addon.blender.settings.preferences import Defaults, RADIOSITY_AP_
 from radiosity_addon.farm import FarmCommand, Spool, output_spool
 from radiosity_addon.farm.farm_command import split
 from radiosity_addon.options import BakeSettings
+from tests.moments import until
 from tests.processes import ROOT
 
 WORKER = """
@@ -44,13 +44,6 @@ def preferred(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespac
     (tmp_path / "my spools").mkdir()
     monkeypatch.setattr(farm, "preferences", lambda _context: chosen)
     return chosen
-
-
-def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def report(folder: Path) -> dict:

@@ -150,6 +150,18 @@ def test_parts_are_turned_as_a_whole_or_not_at_all() -> None:
     assert np.bincount(wound_parts(places(triangles))).tolist() == [32, 32, 32]
 
 
+@pytest.mark.parametrize(("behind", "flips"), [(16, 16), (14, 0)])
+def test_the_button_is_offered_where_it_would_flip(behind: int, flips: int) -> None:
+    scene = gray_scene(rectangle((0, 0, 0), (4, 0, 0), (0, 0, 4), 4))
+    front, back = np.ones(32), np.zeros(32)
+    front[:behind], back[:behind] = 0.0, 1.0
+    item = replace(bake_object("Wall", 0, 32), polygon=np.tile(np.arange(16), 2))
+    (warning,) = turned_away([item], scene, front, back, AlwaysLit())
+    assert len(warning.turned) == flips
+    assert ("Flip Faces" in warning.message) == bool(flips)
+    assert "Mesh → Normals → Flip" in warning.message
+
+
 def test_without_light_nothing_is_turned_away() -> None:
     objects = [bake_object("Dark", 0, 2)]
     assert list(turned_away(objects, patches(2), np.zeros(2), np.zeros(2), AlwaysLit())) == []
