@@ -142,7 +142,7 @@ def _bake(
     lighting_seconds = stages.light * len(geometry) / max(sum(plan.texels), 1.0)
     solving, lighting, encoding = rest.expecting([stages.solve, lighting_seconds, stages.encode])
     with timed(seconds, "solve"):
-        solution = solve_scene(bake_scene, quality.solver, solving, apart=keep)
+        solution = solve_scene(bake_scene, quality.solver, solving)
     lighting.stage("light", 0.0, 1.0).at(0.0)
     give_back()
     is_shown = share_out_memory(geometry, settings, keep)
@@ -272,13 +272,8 @@ def texels_of(
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 
-def solve_scene(
-    bake_scene: BakeScene, settings: SolverSettings, progress: Progress, apart: bool = True
-) -> Solution:
-    """Solve, with a picture of the solution at first, now and then, and at the end.
-
-    apart: Whether every lamp's light must be known; else many lamps are grouped.
-    """
+def solve_scene(bake_scene: BakeScene, settings: SolverSettings, progress: Progress) -> Solution:
+    """Solve, many lamps as groups, with a picture of the solution at first, now and then, and at the end."""
     next_picture, last = 0.0, None
 
     def look(state: SolverState | None) -> Picture | None:
@@ -293,8 +288,7 @@ def solve_scene(
     solving = progress.stage("solve", 0.0, 1.0, look)
     solving.at(0.0)
     scene = bake_scene.scene
-    if not apart:
-        scene = scene.with_lights(grouped(scene.lights, most=LAMPS_PER_RAY * settings.shadow_rays))
+    scene = scene.with_lights(grouped(scene.lights, most=LAMPS_PER_RAY * settings.shadow_rays))
     solution = solve(scene, settings, solving)
     next_picture = 0.0
     solving.at(1.0, last)
@@ -330,7 +324,10 @@ def _texel_values(
     if settings.quantity == "residual":
         residual = texel_residual(solution, geometry, gather, progress)
         return TexelValues(residual, solution.local_pass.caster)
-    relightable = solution.relightable(bake_scene.emitter) if keep else None
+    relightable = None
+    if keep:
+        most = LAMPS_PER_RAY * quality_of(settings).solver.shadow_rays
+        relightable = solution.relightable(bake_scene.emitter, bake_scene.scene.lights, most)
     local = solution.local_pass if relightable is None else relightable.local
     if settings.relative_error is None:
         light = light_texels(bake_scene.scene, local, geometry, gather, so_far=so_far, progress=progress)

@@ -18,6 +18,7 @@ from .environment import (
     solid_angles,
 )
 from .lamp_group import LampGroup, each_lamp, grouped
+from .lamp_table import LampTable
 from .light import Emitter, Lamp, Light, Rays
 from .point import PointLight, SpotLight
 from .sun_and_sky import EnvironmentLight, SunLight, light_strengths
@@ -31,6 +32,7 @@ __all__ = [
     "EnvironmentLight",
     "Lamp",
     "LampGroup",
+    "LampTable",
     "Light",
     "PointLight",
     "Rays",

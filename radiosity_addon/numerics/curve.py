@@ -15,8 +15,10 @@ def along_curve(places: Array) -> Array:
     if len(places) == 0:
         return np.zeros(0, dtype=np.int64)
     low = places.min(axis=0)
-    width = float(np.maximum((places.max(axis=0) - low).max(), np.finfo(float).tiny))
+    width = float((places.max(axis=0) - low).max())
     code = np.zeros(len(places), dtype=np.int64)
+    if width == 0.0:
+        return code
     for axis in range(3):
         cell = ((places[:, axis] - low[axis]) * (((1 << BITS) - 1) / width)).astype(np.int64)
         for bit in range(BITS):

@@ -73,4 +73,4 @@ def carried(solved: Relightable, scene: Scene, emitter: Array | None = None) -> 
         irradiance=before.irradiance,
         radiosity=before.radiosity,
     )
-    return Relightable(sources, solved.elements, LocalPass.of(state, sources))
+    return Relightable(sources, solved.elements, LocalPass.of(state, sources, local.direct.part))

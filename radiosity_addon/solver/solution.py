@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..lights import Light
 from ..numerics import Array
-from .element_transport import Relightable
+from .element_transport import MAX_LINKED, Relightable
 from .gather import Footprints, LocalPass, Residual
 from .state import LinkRecord, SolverState, power_balance, record_links
 
@@ -96,20 +98,24 @@ class Solution:
         """The local pass over this solution: direct light and gather rays at points."""
         return LocalPass.of(self._state)
 
-    def relightable(self, emitter: Array | None = None) -> Relightable:
+    def relightable(
+        self, emitter: Array | None = None, lights: Sequence[Light] | None = None, most: int = MAX_LINKED
+    ) -> Relightable:
         """Return what relighting this scene needs.
 
         Parameters
         ----------
         emitter : (t,) int or None
             Which emissive material each triangle has, see `LightSources`.
+        lights, most
+            See `Relightable.of`.
 
         Raises
         ------
         UsageError
             If the method keeps no links.
         """
-        return Relightable.of(self._state, emitter)
+        return Relightable.of(self._state, emitter, lights, most)
 
     def link_record(self) -> LinkRecord:
         """Return the elements and links, kept small."""

@@ -9,6 +9,7 @@ from .kept_bake import (
     KeptBake,
     damaged,
     held_values,
+    noise_warnings,
     relight_pages,
 )
 from .light_groups import are_wanted, check_groups, group_of, group_pages
@@ -27,6 +28,7 @@ __all__ = [
     "group_of",
     "group_pages",
     "held_values",
+    "noise_warnings",
     "relight_pages",
     "strengths_in",
 ]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
-from ...lightmap.lighting import kept_bytes, relight_texels
+from ...lightmap.lighting import estimated_error, kept_bytes, relight_texels
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.transport import LightingRecord, RelightableTexels, TexelLight
 from ...lightmap.unwrap import Atlas
@@ -32,6 +32,10 @@ DAMAGED = (
     *(FloatingPointError, ZeroDivisionError, RecursionError, MemoryError, np.linalg.LinAlgError),
 )
 """What computing with a sidecar can raise that is not as it was written."""
+
+
+NOISIER, MORE_NOISE = 2.0, 0.01
+"""Relit lightmaps whose noise is so many times that of the bake, and more by so much, cause a warning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +155,26 @@ def relight_pages(kept: KeptBake, strengths: Array, progress: Progress = SILENT)
         return _relight(kept, wanted, progress)
     except (*DAMAGED, BakeError) as error:
         raise damaged(kept.origin) from error
+
+
+def noise_warnings(kept: KeptBake, strengths: Array) -> tuple[BakeWarning, ...]:
+    """Warn if lightmaps that were relit are noisier than the bake: its rays were for other light.
+
+    strengths (s, 3): They were relit with.
+    """
+    scratch, wanted = kept.geometry.scratch, kept.sources.checked(strengths)
+    before, now = (
+        estimated_error(kept.lit, kept.solved, lights, scratch) for lights in (kept.strengths, wanted)
+    )
+    if now <= max(NOISIER * before, before + MORE_NOISE):
+        return ()
+    return (
+        BakeWarning(
+            "scene",
+            f"with these lights the noise is about {now:.1%}; it was {before:.1%} with those of the bake, "
+            "which its rays were aimed at: bake again for cleaner light",
+        ),
+    )
 
 
 def damaged(path: Path | str) -> BakeError:

@@ -32,7 +32,7 @@ from ...options import BakeSettings
 from ...scene import BakeScene, Faces
 from ...solver.element_transport import ElementTransport, Relightable
 from ...solver.emitters import EmitterGroup, LightSources
-from ...solver.gather import AimedRays, LightGains, LocalPass
+from ...solver.gather import AimedRays, CompactGains, LightGains, LocalPass, RunGains
 from ...solver.hierarchy import Clusters, Hierarchy
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
@@ -55,7 +55,7 @@ STORED_CLASSES: tuple[type, ...] = (
     *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
     *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks),
     *(RelightableTexels, TexelTransport, GatherLinks, AimedRays, Interpolation, SubCells, SubCellLinks),
-    *(LightGains, WarmStart, Smoothing, TexelGeometry, Seams),
+    *(LightGains, CompactGains, RunGains, WarmStart, Smoothing, TexelGeometry, Seams),
 )
 """The classes that may be stored: those that relighting reads."""
 

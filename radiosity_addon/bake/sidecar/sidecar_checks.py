@@ -24,11 +24,19 @@ from ...lightmap.transport import (
     TexelTransport,
     WarmStart,
 )
-from ...lights import Light, SkyPatch, SkyTable
+from ...lights import Emitter, Light, SkyPatch, SkyTable
 from ...options import MAX_RESOLUTION, BakeSettings
 from ...solver.element_transport import ElementTransport
 from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
-from ...solver.gather import NOTHING, AimedRays, LightGains, lowest_number
+from ...solver.gather import (
+    MOST_RUNS,
+    NOTHING,
+    AimedRays,
+    CompactGains,
+    LightGains,
+    RunGains,
+    lowest_number,
+)
 from ..scene_diff import as_object_records
 from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements, check_tints
 from .value_checks import (
@@ -257,6 +265,19 @@ def _check_interpolation(spread: Interpolation, texels: int, gather: int) -> Non
 
 def _check_gains(gains: LightGains, count: int, lamps: int) -> None:
     require(gains.count == count, "gains of something else")
+    if isinstance(gains, CompactGains):
+        require(instance(gains.scale_of, dict).keys() == gains.gain_of.keys(), "gains of no scale")
+        for scale in gains.scale_of.values():
+            number(scale, 0.0)
+    if isinstance(gains, RunGains):
+        of_lamps = instance(gains.lamps, tuple)
+        require(all(isinstance(lamp, Emitter) for lamp in of_lamps), "lamps of no place")
+        require(bool(of_lamps), "runs of no lamps")
+        integers(gains.numbers, (len(of_lamps),), 0, lamps - 1)
+        numbers(gains.points, (count, 3), -LARGE)
+        numbers(gains.normals, (count, 3), -1.0 - SHARE_TOLERANCE, 1.0 + SHARE_TOLERANCE)
+        runs = min(len(of_lamps), MOST_RUNS)
+        array_of(gains.seen, "u", (count, runs, *_channels(gains.seen[:, 0])))
     for light, (rows, gain) in instance(gains.gain_of, dict).items():
         whole(light, 0, lamps - 1)
         if rows is None:

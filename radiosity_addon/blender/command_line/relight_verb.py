@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...bake import BakeDigests, KeepOptions, timed
-from ...bake.relight import strengths_in
+from ...bake.relight import noise_warnings, strengths_in
 from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeError, BakeWarning, Status, UsageError, staged
@@ -151,9 +151,11 @@ def relight_into(
         with timed(seconds, "relight"):
             kept = stored.kept(export.bake_scene)
             yield Status("relight", RELIGHT)
-            pages, groups = lit(kept, strengths_in(kept, export.bake_scene))
+            strengths = strengths_in(kept, export.bake_scene)
+            pages, groups = lit(kept, strengths)
+            noisy = noise_warnings(kept, strengths)
         result = stored.result(export.bake_scene, pages)
-        result = replace(result, groups=groups, warnings=(*notes, *result.warnings))
+        result = replace(result, groups=groups, warnings=(*notes, *result.warnings, *noisy))
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Status("apply", APPLY)

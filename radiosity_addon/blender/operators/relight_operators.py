@@ -33,6 +33,8 @@ class RADIOSITY_OT_relight(Conditional, WindowJob, bpy.types.Operator):
             named = ", ".join(f"'{label}'" for label in self._report.needs_bake)
             text = f"{relit} with the settings of the bake; {named} changed since: bake again"
             self.report({"WARNING"}, text)
+        elif self._report.warnings:
+            self.report({"WARNING"}, f"{relit}; {self._report.warnings[0].message}")
         else:
             self.report({"INFO"}, relit)
         warn_of_outdated(self, context)

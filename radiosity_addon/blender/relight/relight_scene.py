@@ -10,11 +10,18 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...bake.relight import KeptBake, are_wanted, group_pages, relight_pages, strengths_in
+from ...bake.relight import (
+    KeptBake,
+    are_wanted,
+    group_pages,
+    noise_warnings,
+    relight_pages,
+    strengths_in,
+)
 from ...bake.result import LightGroup
 from ...bake.scene_diff import OF_NO_CONSEQUENCE
 from ...bake.sidecar import StoredBake, read_sidecar
-from ...base import SILENT, BakeError, Progress, Status, drain, staged
+from ...base import SILENT, BakeError, BakeWarning, Progress, Status, drain, staged
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..apply.rebake import Originals
@@ -36,7 +43,7 @@ Relit = tuple[tuple[LightmapPage, ...], tuple[LightGroup, ...]]
 
 @dataclass(frozen=True)
 class RelightReport:
-    """What was done: the seconds it took, and whether anything had changed.
+    """What was done: the seconds it took, whether anything had changed, and what is wrong with the result.
 
     needs_bake: Labels of the options that the panel now has other values of than the bake, which count there.
     """
@@ -44,6 +51,7 @@ class RelightReport:
     seconds: float
     changed: bool
     needs_bake: tuple[str, ...] = ()
+    warnings: tuple[BakeWarning, ...] = ()
 
 
 def run_relight(
@@ -63,14 +71,14 @@ def run_relight(
     yield Status("export", 0.0)
     held, strengths = yield from staged(strengths_steps(context, in_background), "export", 0.0, 0.0)
     same = np.array_equal(strengths, held.shown)
-    pages, groups = yield from _lit_in_thread(held.bake, strengths, in_background)
+    (pages, groups), warnings = yield from _lit_in_thread(held.bake, strengths, in_background)
     yield Status("write", LIT)
     mark = kept_bakes.mark_of(context.scene)
     taken = time.perf_counter() - started
     rewrite(mark, pages, groups, taken)
     note_shown(context.scene, held, strengths)
     needs_bake = changed_labels(context.scene.radiosity, held.bake.settings, OF_NO_CONSEQUENCE)
-    return RelightReport(time.perf_counter() - started, not same, needs_bake)
+    return RelightReport(time.perf_counter() - started, not same, needs_bake, warnings)
 
 
 def read_strengths(context: bpy.types.Context) -> tuple[InMemory, Array]:
@@ -129,12 +137,17 @@ def lit(kept: KeptBake, strengths: Array, progress: Progress = SILENT) -> Relit:
     return pages, group_pages(kept, pages, strengths, progress.part(0.5, 1.0))
 
 
-def _lit_in_thread(kept: KeptBake, strengths: Array, in_background: bool) -> Generator[Status, None, Relit]:
-    """Do the same in a thread."""
+def _lit_in_thread(
+    kept: KeptBake, strengths: Array, in_background: bool
+) -> Generator[Status, None, tuple[Relit, tuple[BakeWarning, ...]]]:
+    """Do the same in a thread, and warn of noise."""
     status = Status("relight", READ)
-    steps = in_thread(
-        lambda progress: lit(kept, strengths, progress.stage("relight", READ, LIT)), in_background
-    )
+
+    def work(progress: Progress) -> tuple[Relit, tuple[BakeWarning, ...]]:
+        relit = lit(kept, strengths, progress.stage("relight", READ, LIT))
+        return relit, noise_warnings(kept, strengths)
+
+    steps = in_thread(work, in_background)
     try:
         while True:
             try:

@@ -9,10 +9,11 @@ from .accuracy import light_within
 from .error_picture import residual_summary, texel_residual
 from .partial_light import LightSoFar
 from .reconstruction import light_texels, lit_as_texels
-from .relighting import kept_bytes, relight_texels
+from .relighting import estimated_error, kept_bytes, relight_texels
 
 __all__ = [
     "LightSoFar",
+    "estimated_error",
     "kept_bytes",
     "light_texels",
     "light_within",

@@ -16,7 +16,14 @@ from ...numerics import Array, Scratch, tiles
 from ...solver.element_transport import Relightable
 from ...solver.gather import table_end, values_of
 from ..texels import TexelGeometry
-from ..transport import RelightableTexels, SmoothingChoice, TexelLight, sweep
+from ..transport import (
+    RelightableTexels,
+    SmoothingChoice,
+    TexelLight,
+    estimated_noise,
+    relative_error,
+    sweep,
+)
 
 SOLVED = 0.3
 """How much is done when the hierarchy is solved; rough."""
@@ -56,7 +63,8 @@ def relight_texels(
     known = kept.warm_start.mixed(strengths)
     if known is None:
         table, left = kept.warm_start.part_of(strengths)
-        reflected = local.elements.reflected(solved.elements.irradiance(left))
+        more = _at_leaves(kept, solved, left)
+        reflected = local.elements.reflected(solved.elements.irradiance(left, more))
         first, count = table, len(kept.element)
         for rows in tiles(len(table)):
             after = slice(max(rows.start - count, 0), max(rows.stop - count, 0))
@@ -85,6 +93,47 @@ def relight_texels(
     if known is None and light.table is not None:
         kept.warm_start.add(strengths, light.table)
     return light
+
+
+def estimated_error(
+    kept: RelightableTexels, solved: Relightable, strengths: Array, scratch: Scratch | None = None
+) -> float:
+    """Estimate the relative RMS error of the light of relit texels: the noise of their gather rays.
+
+    strengths (s, 3): They were relit with.
+    """
+    sources, links, threads = solved.sources, kept.transport.links, solved.local.threads
+    solution, beyond = kept.warm_start.mixed(strengths), table_end(sources.sky(strengths))
+    assert solution is not None  # it is remembered
+    table = np.concatenate([solution, beyond.astype(np.float32)])
+    noise = estimated_noise(links, table, threads, scratch)
+    direct = kept.gains.irradiance(sources.of_lamps(strengths))
+    return relative_error(noise, direct, links.irradiance(table, threads, scratch))
+
+
+def _at_leaves(kept: RelightableTexels, solved: Relightable, strengths: Array) -> Array | None:
+    """Return (e, 3) what lights without links bring leaf elements [W/m²], as texels and cells on them know.
+
+    None if there are none of these lights.
+    """
+    sources = solved.sources
+    lights = np.zeros((len(strengths), 1), dtype=bool)
+    lights[: len(sources.lights), 0] = solved.elements.unlinked
+    if not strengths[lights[:, 0]].any():
+        return None
+    given = sources.of_lamps(np.where(lights, strengths, 0.0))
+    texels, cells = len(kept.element), kept.transport.cells
+    count = solved.local.elements.hierarchy.n_elements
+    known = [(kept.element, kept.gains)]
+    known += [(cells.element[of.rows - texels], of.gains) for of in cells.links if of.gains is not None]
+    total, points = np.zeros((count, 3)), np.zeros(count)
+    for element, gains in known:
+        there = element >= 0
+        arriving = gains.irradiance(given)[there]
+        points += np.bincount(element[there], minlength=count)
+        for channel in range(3):
+            total[:, channel] += np.bincount(element[there], arriving[:, channel], minlength=count)
+    return np.asarray(total / np.maximum(points, 1.0)[:, None])
 
 
 def kept_bytes(kept: RelightableTexels) -> int:

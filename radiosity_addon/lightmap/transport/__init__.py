@@ -11,7 +11,15 @@ from .gather_settings import GatherSettings
 from .hit_table import HitTable, TableRows
 from .more_rays import with_more_rays
 from .sub_cells import SubCellHits, SubCellLinks, SubCells, gather_sub_cells
-from .sweeps import RelightableTexels, SmoothingChoice, TexelLight, TexelTransport, sweep
+from .sweeps import (
+    RelightableTexels,
+    SmoothingChoice,
+    TexelLight,
+    TexelTransport,
+    estimated_noise,
+    relative_error,
+    sweep,
+)
 from .traced_texels import GatherPointLayout, LightingRecord
 from .warm_start import WarmStart
 
@@ -32,9 +40,11 @@ __all__ = [
     "TexelLight",
     "TexelTransport",
     "WarmStart",
+    "estimated_noise",
     "gather_footprints",
     "gather_sub_cells",
     "gather_texels",
+    "relative_error",
     "sample_of",
     "sweep",
     "with_more_rays",

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, across, marked, tiles
-from ...solver.gather import LightGains
+from ...solver.gather import LightGains, joined_gains
 from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
 from .source_means import SourceMeans
@@ -123,7 +123,7 @@ def _joined(parts: list[SubCellHits]) -> SubCellHits:
         parts[0].of_element,
         np.concatenate([hits.number for hits in parts]),
         np.concatenate([hits.sources for hits in parts]),
-        LightGains.joined(gains) if gains else None,
+        joined_gains(gains) if gains else None,
         np.concatenate(tints) if tints else None,
     )
 
@@ -274,12 +274,12 @@ class _SubCellGather:
         direct, lamps = self._table.local.direct, self._scratch.empty((len(hits.number), 3))
         kept = []
         for tile, part in progress.each(list(tiles(len(lamps)))):
-            gains = direct.new_gains(len(lamps[tile]))
             at = self._table.lit_footprints(hits.number[tile], hits.of_element)
+            gains = direct.new_cell_gains(at)
             lamps[tile] = direct.at(at, hits.shadow_rays, gains, progress=part)
             if gains is not None:
                 kept.append(gains)
-        return LightGains.joined(kept) if kept else None, lamps
+        return joined_gains(kept) if kept else None, lamps
 
 
 class _FoundCells:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base import Progress
 from ...numerics import Array
-from ...solver.gather import Footprints, LightGains, LightQuery, LocalPass, alike
+from ...solver.gather import Footprints, LightGains, LightQuery, LocalPass, RunGains, alike
 from ..texels import SmoothLift, TexelGeometry
 from ..transport import HitTable, SubCellHits, sample_of
 from .previous import PreviousLight
@@ -29,7 +29,8 @@ def texel_gains(previous: PreviousLight, local: LocalPass, progress: Progress) -
     """Return what lights add to texels, asked again where it may have changed."""
     affected = previous.affected
     geometry, lift = affected.geometry, SmoothLift(affected.geometry)
-    gains = LightGains(len(geometry))
+    gains = local.direct.new_gains(len(geometry))
+    assert gains is not None  # light is kept apart
     for (query, moved), part in progress.each(changed_lights(local, previous.local)):
         gain = previous.lit.gains.of(query.number)
         touched = affected.texels.copy()
@@ -50,13 +51,25 @@ def sub_cell_gains(
     """Return what lights add to cells, at (p, 3) anchors, asked again where it may have changed."""
     assert hits.gains is not None  # kept cells keep them
     local, boxes = table.local, previous.affected.boxes
+    changed = changed_lights(local, previous.local)
+    if isinstance(hits.gains, RunGains):
+        # A run is asked as a whole.
+        touched = np.zeros(len(hits.number), dtype=bool)
+        for query, moved in changed:
+            touched |= moved | boxes.between(at, query.light, widen)
+        rows = np.flatnonzero(touched)
+        points = table.lit_footprints(hits.number[rows], hits.of_element)
+        found = local.direct.new_cell_gains(points)
+        assert isinstance(found, RunGains)  # as they were
+        local.direct.at(points, hits.shadow_rays, found, progress=progress)
+        return hits.gains.replaced(rows, found)
     gains = LightGains(len(hits.number))
-    for (query, moved), part in progress.each(changed_lights(local, previous.local)):
+    for (query, moved), part in progress.each(changed):
         gain = hits.gains.of(query.number)
         rows = np.flatnonzero(moved | boxes.between(at, query.light, widen))
         points = table.lit_footprints(hits.number[rows], hits.of_element)
-        gain, found = alike(gain, local.direct.gain(query, points, hits.shadow_rays, part))
-        gain[rows] = found
+        gain, asked = alike(gain, local.direct.gain(query, points, hits.shadow_rays, part))
+        gain[rows] = asked
         gains.put(query.number, gain)
     return gains
 

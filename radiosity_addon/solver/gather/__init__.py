@@ -14,18 +14,22 @@ from .final_gather import MOST_TINT, GatheredHits
 from .footprints import Footprints
 from .gather_rays import Gather
 from .hit_numbers import NOTHING, UNNUMBERED, Resolver, lowest_number, table_end, values_of
-from .light_gains import LightGains, alike
+from .light_gains import CompactGains, LightGains, alike
 from .local_pass import LocalPass
+from .lone_shadows import part_of_rays
 from .residual import Residual
 from .retracing import Before, MovedGeometry
+from .run_gains import MOST_RUNS, RunGains, joined_gains
 
 __all__ = [
+    "MOST_RUNS",
     "MOST_TINT",
     "NOTHING",
     "UNNUMBERED",
     "AimedRays",
     "Before",
     "Boxes",
+    "CompactGains",
     "DirectLight",
     "ElementCells",
     "ElementLookup",
@@ -38,8 +42,11 @@ __all__ = [
     "MovedGeometry",
     "Residual",
     "Resolver",
+    "RunGains",
     "alike",
+    "joined_gains",
     "lowest_number",
+    "part_of_rays",
     "table_end",
     "values_of",
 ]

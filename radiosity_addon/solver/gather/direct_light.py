@@ -9,14 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ...base import SILENT, Progress
-from ...lights import Lamp
+from ...lights import Emitter, Lamp, LampGroup, LampTable, light_strengths
 from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..state import SolverState
-from .footprints import Footprints, SpreadPoints
+from .footprints import SPREAD, Footprints, SpreadPoints
 from .group_shadows import shadow_share
-from .light_gains import LightGains
+from .light_gains import CompactGains, LightGains
+from .lone_shadows import SHARED_STARTS, LoneShadowShare, one_lamp
+from .run_gains import RunGains
+from .soft_shadows import ShadowShare
 
 NEAR_FACTOR = 0.05
 """Form factor beyond which emissive faces are so near that it may change over a texel."""
@@ -35,15 +40,22 @@ class DirectLight:
     """Light straight from lamps and emissive surfaces; the sky's is gathered.
 
     sources: Given, gains of every light can be kept apart (`LightGains`), for relighting.
+    part: Of the rays of a single one, what each of many lamps has that are kept apart (`part_of_rays`); 0 if
+        they are few.
     """
 
-    def __init__(self, state: SolverState, sources: LightSources | None = None) -> None:
-        self._state, self.sources = state, sources
+    def __init__(self, state: SolverState, sources: LightSources | None = None, part: float = 0.0) -> None:
+        self._state, self.sources, self.part = state, sources, part
         self.emitters = (
             emitter_groups(state.scene, state.hierarchy.faces, state.caster)
             if sources is None
             else sources.groups
         )
+
+    @property
+    def many(self) -> bool:
+        """Whether lamps are kept apart that are many."""
+        return self.part > 0.0
 
     def at(
         self,
@@ -68,6 +80,12 @@ class DirectLight:
         if gains is not None:
             points = replace(points, expected=None)
         spread = self._spread(points)
+        if isinstance(gains, RunGains):
+            progress, of_runs = progress.part(0.0, 0.3), progress.part(0.3, 1.0)
+            in_runs = set(gains.numbers.tolist())
+            lights = [query for query in lights if query.number not in in_runs]
+            self._see_runs(gains, spread, of_runs)
+            total += gains.irradiance(light_strengths(self._state.scene.lights))
         for query, part in progress.each(lights):
             arriving = self._arriving(query, spread, rays, part)
             for rows in tiles(len(total)):
@@ -104,7 +122,8 @@ class DirectLight:
 
     def _spread(self, points: Footprints) -> SpreadPoints:
         settings = self._state.settings
-        return SpreadPoints(points, settings.seed + Stream.FOOTPRINT, settings.threads)
+        count = SHARED_STARTS if self.many else SPREAD
+        return SpreadPoints(points, settings.seed + Stream.FOOTPRINT, settings.threads, count)
 
     def _arriving(
         self, asked: LightQuery, spread: SpreadPoints, rays: int | None, progress: Progress
@@ -116,8 +135,14 @@ class DirectLight:
         light, settings = asked.light, self._state.settings
         glows = isinstance(light, EmitterGroup)
         caster = self._state.caster if glows else self._state.caster.for_lamps
-        gain = spread.gain(light, NEAR_FACTOR if glows else 0.0, progress.part(0.0, 0.1))
-        share = shadow_share(caster, light, spread, asked.seed, settings.threads)
+        if self.many and isinstance(light, Emitter):
+            gain = spread.gain(one_lamp(light), progress=progress.part(0.0, 0.1))
+            share: ShadowShare = LoneShadowShare(
+                caster, light, spread, asked.seed, settings.threads, self.part
+            )
+        else:
+            gain = spread.gain(light, NEAR_FACTOR if glows else 0.0, progress.part(0.0, 0.1))
+            share = shadow_share(caster, light, spread, asked.seed, settings.threads)
         unblocked = share.at_points(gain, rays or settings.shadow_rays, progress.part(0.1, 1.0))
         if unblocked.ndim == 2:
             for rows in tiles(len(gain)):
@@ -127,6 +152,18 @@ class DirectLight:
             gain[rows] *= unblocked[rows]
         return gain
 
+    def _see_runs(self, gains: RunGains, spread: SpreadPoints, progress: Progress) -> None:
+        """Find what points see of runs of lamps, a ray for each run to one of them by what it adds."""
+        state, caster = self._state, self._state.caster.for_lamps
+        runs = gains.run_of
+        seed = state.settings.seed + Stream.LAMP_SHADOWS
+        for run, part in progress.each(list(range(gains.seen.shape[1]))):
+            members = tuple(gains.lamps[row] for row in np.flatnonzero(runs == run))
+            group = LampGroup(members, np.ones((len(members), 3)))
+            gain = spread.gain(group, progress=part.part(0.0, 0.5))
+            share = ShadowShare(caster, group, spread, seed + SHADOW_STEP * run, state.settings.threads)
+            gains.see(run, share.at_points(gain, 1, part.part(0.5, 1.0)))
+
     def lit_by(self, gains: LightGains) -> Array:
         """Return (n, 3) what arrives [W/m²] by gains, of the strengths that the sources have."""
         assert self.sources is not None  # else there are no gains
@@ -134,4 +171,22 @@ class DirectLight:
 
     def new_gains(self, count: int, scratch: Scratch | None = None) -> LightGains | None:
         """Return where `count` points keep each light apart; None if lights are not kept apart."""
-        return None if self.sources is None else LightGains(count, scratch)
+        if self.sources is None:
+            return None
+        return CompactGains(count, scratch) if self.many else LightGains(count, scratch)
+
+    def new_cell_gains(self, points: Footprints) -> LightGains | None:
+        """Return the same for cells, which answer rays: many lamps by runs (`RunGains`)."""
+        if not self.many:
+            return self.new_gains(len(points))
+        lights = self._state.scene.lights
+        lamps = [
+            (number, lit)
+            for number, lit in enumerate(lights)
+            if isinstance(lit, Emitter) and lit.casts_shadow
+        ]
+        order = LampTable([lamp for _, lamp in lamps]).order
+        numbers = np.array([number for number, _ in lamps], dtype=np.int32)[order]
+        channels = (3,) if self._state.caster.for_lamps.tinted else ()
+        chosen = [lamps[row][1] for row in order]
+        return RunGains(points.points, points.normals, chosen, numbers, channels)

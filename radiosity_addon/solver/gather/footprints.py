@@ -10,7 +10,16 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array, Scratch, fill_chunks, marked, row_numbers, stratified_square, trim
+from ...numerics import (
+    Array,
+    Scratch,
+    fill_chunks,
+    marked,
+    row_numbers,
+    stratified_square,
+    tiles,
+    trim,
+)
 from ..emitters import EmitterGroup
 
 SPREAD = 4
@@ -26,6 +35,12 @@ part, the center stands for all: what bends that little bends a mean by its squa
 UNEVEN = ((0.02, 16), (0.1, 64))
 """Where a few points of a texel differ by more than a part, as next to a lamp or at the rim of a spot's cone,
 so many are evaluated. Cells, which only answer rays, are evaluated at few: many cells are averaged."""
+
+SAME_OF_MANY = 0.05
+"""The same of each of many lamps."""
+
+DIM = 1.0
+"""Of many lamps, what is less than this part of a lamp's mean is evaluated at few points."""
 
 EDGE_DIFFERENCE = 0.5
 """Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
@@ -98,22 +113,24 @@ class Footprints:
 class SpreadPoints:
     """The centers of footprints and a few points spread over each, which all lamps share.
 
-    count: Points of each; 1, the center, without a sampler.
+    count: Points of each; 1, the center, without a sampler. More than `SPREAD` are for many lamps.
     """
 
-    def __init__(self, at: Footprints, seed: int, threads: int = 0) -> None:
+    def __init__(self, at: Footprints, seed: int, threads: int = 0, count: int = SPREAD) -> None:
         self.at, self._seed, self._threads = at, seed, threads
-        self.count = SPREAD if at.sampler else 1
+        self.count = count if at.sampler else 1
+        self._many = count > SPREAD
+        self.same_gain = SAME_OF_MANY if self._many else SAME_GAIN
         # From the center: single precision is too coarse for the place of small things far from the origin.
         self._apart = at.scratch.zeros((len(at), self.count, 3), np.float32)
         self._farthest = np.zeros(len(at), dtype=np.int8)
         if at.sampler is not None:
             into = (self._apart, self._farthest)
-            fill_chunks(partial(_spread, at, at.sampler, seed), into, len(at), CHUNK_POINTS, threads)
+            fill_chunks(partial(_spread, at, at.sampler, seed, count), into, len(at), CHUNK_POINTS, threads)
 
-    def points(self, rows: Array | slice) -> Array:
-        """Return (r, count, 3) float64: the points of some footprints."""
-        return np.asarray(self.at.points[rows, None] + self._apart[rows])
+    def points(self, rows: Array | slice, count: int | None = None) -> Array:
+        """Return (r, count, 3) float64: the first points of some footprints, or all."""
+        return np.asarray(self.at.points[rows, None] + self._apart[rows, :count])
 
     def gain(self, light: Lamp | EmitterGroup, least: float = 0.0, progress: Progress = SILENT) -> Array:
         """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
@@ -130,7 +147,7 @@ class SpreadPoints:
         fill_chunks(ask, into, len(at), CHUNK_POINTS, self._threads, progress.part(0.0, 0.5))
         # Right under a lamp two points may happen to see it alike: their neighbors do not.
         bent = row_numbers(varies if at.near is None or least else at.near(varies))
-        average, part = partial(_varying, self, light, bent), progress.part(0.5, 1.0)
+        average, part = partial(_varying, self, light, self._dim(gain), bent), progress.part(0.5, 1.0)
         fill_chunks(average, gain, len(bent), CHUNK_POINTS, self._threads, part, at=bent)
         if at.near is not None and jump.any():
             # An edge that only cuts a footprint's corner is found from its neighbors.
@@ -140,8 +157,16 @@ class SpreadPoints:
             doubted = row_numbers(at.near(lit) & at.near(~lit) & at.near(counts) & ~crossed)
             crossed[doubted] = self.is_cut(light, doubted, lit[doubted])
             rows = row_numbers(crossed & at.near(counts))
-            gain[rows], _ = self.many(light, rows, UNEVEN[-1][1])
+            fine = gain[rows] > self._dim(gain)
+            for chosen, count in ((fine, UNEVEN[-1][1]), (~fine, UNEVEN[0][1])):
+                gain[rows[chosen]], _ = self.many(light, rows[chosen], count)
         return gain
+
+    def _dim(self, gain: Array) -> float:
+        """Return the gain from which on a footprint is worth more points than all lamps share."""
+        if not self._many:
+            return -np.inf
+        return DIM * float(sum(gain[tile].sum() for tile in tiles(len(gain)))) / max(len(gain), 1)
 
     def matters(self, light: Lamp | EmitterGroup, gain: Array, rows: slice) -> Array:
         """Return (r,) bool: whether a light of this gain (r,) adds to what is expected at rows."""
@@ -159,11 +184,9 @@ class SpreadPoints:
     def is_cut(self, light: Lamp | EmitterGroup, rows: Array, lit: Array) -> Array:
         """Return (r,) whether any corner of rows' footprints is lit unlike their centers, `lit` (r,)."""
         cut = np.empty(len(rows), dtype=bool)
-        assert self.at.sampler is not None
         for start in range(0, len(rows), CHUNK_POINTS):
             chunk = slice(start, start + CHUNK_POINTS)
-            corners = np.broadcast_to(CORNERS, (len(rows[chunk]), *CORNERS.shape))
-            bright = self.gains(light, rows[chunk], self.at.sampler(rows[chunk], corners)) > 0.0
+            bright = self.gains(light, rows[chunk], self._corners_of(rows[chunk])) > 0.0
             cut[chunk] = (bright != lit[chunk, None]).any(axis=1)
         return cut
 
@@ -173,11 +196,37 @@ class SpreadPoints:
         step = CHUNK_POINTS // count * SPREAD
         for start in range(0, len(rows), step):
             part = slice(start, start + step)
-            unit = stratified_square(self.at.keys[rows[part]], count, self._seed)
-            assert self.at.sampler is not None
-            each = self.gains(light, rows[part], self.at.sampler(rows[part], unit))
+            each = self.gains(light, rows[part], self._points_of(rows[part], count))
             mean[part], deviation[part] = each.mean(axis=1), each.std(axis=1)
         return mean, deviation
+
+    def _corners_of(self, rows: Array) -> Array:
+        """Return (r, 4, 3) the corners of some footprints."""
+        if not self._many:
+            assert self.at.sampler is not None
+            return self.at.sampler(rows, np.broadcast_to(CORNERS, (len(rows), *CORNERS.shape)))
+        return np.asarray(self.at.points[rows, None] + self._corners[rows])
+
+    @cached_property
+    def _corners(self) -> Array:
+        """(n, 4, 3) float32: the corners of all footprints from their centers, for many lamps."""
+        corners = self.at.scratch.empty((len(self.at), len(CORNERS), 3), np.float32)
+        assert self.at.sampler is not None
+        fill_chunks(
+            partial(_corners_apart, self.at, self.at.sampler),
+            corners,
+            len(self.at),
+            CHUNK_POINTS,
+            self._threads,
+        )
+        return corners
+
+    def _points_of(self, rows: Array, count: int) -> Array:
+        """Return (r, count, 3) points of some footprints: shared ones, as far as there are so many."""
+        if count <= self.count:
+            return self.points(rows, count)
+        assert self.at.sampler is not None
+        return self.at.sampler(rows, stratified_square(self.at.keys[rows], count, self._seed))
 
     def gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
@@ -186,12 +235,19 @@ class SpreadPoints:
         return np.asarray(gain.reshape(-1, count))
 
 
-def _spread(at: Footprints, sampler: Sampler, seed: int, part: slice) -> tuple[Array, Array]:
-    """Return (r, k, 3) points of footprints from their centers, and (r,) which is farthest."""
+def _spread(at: Footprints, sampler: Sampler, seed: int, count: int, part: slice) -> tuple[Array, Array]:
+    """Return (r, count, 3) points of footprints from their centers, and (r,) which is farthest."""
     rows = np.arange(part.start, part.stop)
-    points = sampler(rows, stratified_square(at.keys[part], SPREAD, seed))
+    points = sampler(rows, stratified_square(at.keys[part], count, seed))
     apart = points - at.points[part, None]
     return apart, (apart**2).sum(axis=2).argmax(axis=1)
+
+
+def _corners_apart(at: Footprints, sampler: Sampler, part: slice) -> Array:
+    """Return (r, 4, 3) the corners of footprints from their centers."""
+    rows = np.arange(part.start, part.stop)
+    corners = np.broadcast_to(CORNERS, (len(rows), *CORNERS.shape))
+    return np.asarray(sampler(rows, corners) - at.points[part, None])
 
 
 def _at_centers(
@@ -210,19 +266,19 @@ def _at_centers(
             asked = np.flatnonzero((own == 0.0) | spread.matters(light, own, part))
             other = light.unit_irradiance(spread.farthest(part.start + asked), normals[asked])
             here = own[asked]
-            varies[asked] = np.abs(other - here) > SAME_GAIN * np.maximum(here, other)
+            varies[asked] = np.abs(other - here) > spread.same_gain * np.maximum(here, other)
             jump[asked] = np.abs(other - here) > EDGE_DIFFERENCE * np.maximum(here, other)
     return own, varies, jump
 
 
-def _varying(spread: SpreadPoints, light: Lamp | EmitterGroup, bent: Array, part: slice) -> Array:
+def _varying(spread: SpreadPoints, light: Lamp | EmitterGroup, dim: float, bent: Array, part: slice) -> Array:
     """Return (r,) the mean gain at rows over which it varies."""
     rows = bent[part]
-    each = spread.gains(light, rows, spread.points(rows))
+    each = spread.gains(light, rows, spread.points(rows, SPREAD))
     mean, deviation = each.mean(axis=1), each.std(axis=1)
     if spread.at.near is None:
         return np.asarray(mean)
     for least, count in UNEVEN:
-        uneven = np.flatnonzero(deviation > least * mean)
+        uneven = np.flatnonzero((deviation > least * mean) & (mean > dim))
         mean[uneven], deviation[uneven] = spread.many(light, rows[uneven], count)
     return np.asarray(mean)

@@ -1,4 +1,7 @@
-"""What points get of each light apart, per unit of its strength: kept, it relights them without rays."""
+"""What points get of each light apart, per unit of its strength: kept, it relights them without rays.
+
+Of many lights it is kept in half precision.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,9 @@ from ...numerics import Array, Scratch, marked, row_numbers, tiles
 SPARSE = 0.5
 """A light that reaches less than this part of the points is kept as the rows it reaches: 8 bytes each; else
 as 4 bytes a point."""
+
+HALF_BITS = 14
+"""Half precision holds numbers below 2^16, and no finer parts than 2^-24: gains are kept from here down."""
 
 
 def by_channel(gain: Array) -> Array:
@@ -32,7 +38,7 @@ class LightGains:
         int32; None for all rows. (k, 3) by channel where its light passes glass.
     """
 
-    STORED = ("count", "gain_of")
+    STORED: tuple[str, ...] = ("count", "gain_of")
 
     _scratch: Scratch | None = None
 
@@ -105,3 +111,51 @@ class LightGains:
                 arriving = (own if own.ndim == 2 else own[:, None]) * strengths[light]
                 total[tile if rows is None else rows[tile]] += arriving
         return total
+
+
+class CompactGains(LightGains):
+    """Of many lights: half the precision.
+
+    scale_of dict of int to float: What the gains of each light are kept in units of.
+    """
+
+    STORED = ("count", "gain_of", "scale_of")
+
+    SPARSE = 1.0 / 3.0
+    """As `SPARSE`, of gains of two bytes."""
+
+    def __init__(self, count: int, scratch: Scratch | None = None) -> None:
+        super().__init__(count, scratch)
+        self.scale_of: dict[int, float] = {}
+
+    def put(self, light: int, gain: Array) -> None:
+        """Keep the gain of a light at all points: (n,), or (n, 3) by channel."""
+        super().put(light, gain)
+        rows, single = self.gain_of[light]
+        if rows is not None and len(rows) >= self.SPARSE * self.count:
+            rows, single = None, super().of(light)
+        largest = float(single.max(initial=0.0))
+        # A power of two, so that only what is far below the largest loses precision.
+        scale = float(2.0 ** (np.floor(np.log2(largest)) - HALF_BITS)) if largest > 0.0 else 1.0
+        half = (self._scratch or Scratch()).empty(single.shape, np.float16)
+        for tile in tiles(len(single)):
+            half[tile] = single[tile] / np.float32(scale)
+        self.gain_of[light], self.scale_of[light] = (rows, half), scale
+
+    def of(self, light: int) -> Array:
+        """Return (n,) or (n, 3) float32: the gain of a light; 0 of one that was not put in."""
+        return np.asarray(super().of(light).astype(np.float32) * np.float32(self.scale_of.get(light, 1.0)))
+
+    def take(self, points: Array) -> LightGains:
+        """Return those of some points, row numbers or a mask."""
+        result = CompactGains(len(np.arange(self.count)[points]))
+        for light in self.gain_of:
+            result.put(light, self.of(light)[points])
+        return result
+
+    def irradiance(self, strengths: Array) -> Array:
+        """Return (n, 3) float64 what arrives [W/m²] (see `LightGains.irradiance`)."""
+        scaled = strengths.astype(np.float64, copy=True)
+        for light, scale in self.scale_of.items():
+            scaled[light] *= scale
+        return super().irradiance(scaled)

@@ -27,10 +27,10 @@ class LocalPass:
     gather: Gather
 
     @staticmethod
-    def of(state: SolverState, sources: LightSources | None = None) -> LocalPass:
-        """Return that of a solved state; `sources` as for `DirectLight`."""
+    def of(state: SolverState, sources: LightSources | None = None, part: float = 0.0) -> LocalPass:
+        """Return that of a solved state; `sources` and `part` as for `DirectLight`."""
         elements = ElementLookup(state)
-        return LocalPass(elements, DirectLight(state, sources), Gather(elements))
+        return LocalPass(elements, DirectLight(state, sources, part), Gather(elements))
 
     @property
     def caster(self) -> RayCaster:
@@ -44,4 +44,5 @@ class LocalPass:
 
     def with_irradiance(self, irradiance: Array) -> LocalPass:
         """Return the same with other light at the elements, (e, 3) [W/m²]."""
-        return LocalPass.of(replace(self.elements.state, irradiance=irradiance), self.direct.sources)
+        state = replace(self.elements.state, irradiance=irradiance)
+        return LocalPass.of(state, self.direct.sources, self.direct.part)

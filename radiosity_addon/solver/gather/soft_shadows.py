@@ -222,7 +222,7 @@ def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
     """Return (r, count, 3) float64 points of the footprints of some rows."""
     at = spread.at
     if count <= spread.count:
-        return spread.points(rows)[:, :count]
+        return spread.points(rows, count)
     assert at.sampler is not None
     # A point for every ray: behind a small lamp the shadow's edge is as sharp as if its rays were one.
     unit = stratified_square(at.keys[rows], count, seed + Stream.SHADOW_STARTS)

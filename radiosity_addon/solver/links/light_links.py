@@ -62,6 +62,10 @@ class LightLinks:
     def __len__(self) -> int:
         return len(self.receiver)
 
+    def take(self, chosen: Array) -> LightLinks:
+        """Return some of them, row numbers or a mask."""
+        return LightLinks(self.receiver[chosen], self.light[chosen], self.gain[chosen])
+
     @property
     def mean_gain(self) -> Array:
         """(l,) float32: the mean over quarters and channels."""
