@@ -272,11 +272,11 @@ def _check_gains(gains: LightGains, count: int, lamps: int) -> None:
     if isinstance(gains, RunGains):
         of_lamps = instance(gains.lamps, tuple)
         require(all(isinstance(lamp, Emitter) for lamp in of_lamps), "lamps of no place")
-        require(bool(of_lamps), "runs of no lamps")
         integers(gains.numbers, (len(of_lamps),), 0, lamps - 1)
         numbers(gains.points, (count, 3), -LARGE)
         numbers(gains.normals, (count, 3), -1.0 - SHARE_TOLERANCE, 1.0 + SHARE_TOLERANCE)
-        runs = min(len(of_lamps), MOST_RUNS)
+        runs = np.shape(gains.seen)[1]
+        require(0 < runs <= min(len(of_lamps), MOST_RUNS), "runs of no lamps")
         array_of(gains.seen, "u", (count, runs, *_channels(gains.seen[:, 0])))
     for light, (rows, gain) in instance(gains.gain_of, dict).items():
         whole(light, 0, lamps - 1)

@@ -275,7 +275,7 @@ class _SubCellGather:
         kept = []
         for tile, part in progress.each(list(tiles(len(lamps)))):
             at = self._table.lit_footprints(hits.number[tile], hits.of_element)
-            gains = direct.new_cell_gains(at)
+            gains = direct.new_cell_gains(at, hits.shadow_rays)
             lamps[tile] = direct.at(at, hits.shadow_rays, gains, progress=part)
             if gains is not None:
                 kept.append(gains)

@@ -59,7 +59,7 @@ def sub_cell_gains(
             touched |= moved | boxes.between(at, query.light, widen)
         rows = np.flatnonzero(touched)
         points = table.lit_footprints(hits.number[rows], hits.of_element)
-        found = local.direct.new_cell_gains(points)
+        found = local.direct.new_cell_gains(points, hits.shadow_rays)
         assert isinstance(found, RunGains)  # as they were
         local.direct.at(points, hits.shadow_rays, found, progress=progress)
         return hits.gains.replaced(rows, found)

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Emitter, Lamp, LampGroup, LampTable, light_strengths
-from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
+from ...numerics import SHADOW_STEP, Array, Scratch, Stream, fill_chunks, tiles
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..state import SolverState
-from .footprints import SPREAD, Footprints, SpreadPoints
+from .footprints import CHUNK_POINTS, SPREAD, Footprints, SpreadPoints
 from .group_shadows import shadow_share
 from .light_gains import CompactGains, LightGains
 from .lone_shadows import SHARED_STARTS, LoneShadowShare, one_lamp
-from .run_gains import RunGains
+from .run_gains import MOST_RUNS, RUNS, RunGains, seen_of_run
 from .soft_shadows import ShadowShare
 
 NEAR_FACTOR = 0.05
@@ -153,16 +154,15 @@ class DirectLight:
         return gain
 
     def _see_runs(self, gains: RunGains, spread: SpreadPoints, progress: Progress) -> None:
-        """Find what points see of runs of lamps, a ray for each run to one of them by what it adds."""
-        state, caster = self._state, self._state.caster.for_lamps
-        runs = gains.run_of
+        """Find what points see of runs of lamps, by a ray for each run."""
+        state, caster, runs = self._state, self._state.caster.for_lamps, gains.run_of
         seed = state.settings.seed + Stream.LAMP_SHADOWS
         for run, part in progress.each(list(range(gains.seen.shape[1]))):
             members = tuple(gains.lamps[row] for row in np.flatnonzero(runs == run))
             group = LampGroup(members, np.ones((len(members), 3)))
-            gain = spread.gain(group, progress=part.part(0.0, 0.5))
-            share = ShadowShare(caster, group, spread, seed + SHADOW_STEP * run, state.settings.threads)
-            gains.see(run, share.at_points(gain, 1, part.part(0.5, 1.0)))
+            see = partial(seen_of_run, caster, group, spread, run, seed + SHADOW_STEP * run)
+            seen = gains.seen[:, run]
+            fill_chunks(see, seen, len(seen), CHUNK_POINTS, state.settings.threads, part)
 
     def lit_by(self, gains: LightGains) -> Array:
         """Return (n, 3) what arrives [W/m²] by gains, of the strengths that the sources have."""
@@ -175,8 +175,11 @@ class DirectLight:
             return None
         return CompactGains(count, scratch) if self.many else LightGains(count, scratch)
 
-    def new_cell_gains(self, points: Footprints) -> LightGains | None:
-        """Return the same for cells, which answer rays: many lamps by runs (`RunGains`)."""
+    def new_cell_gains(self, points: Footprints, rays: int) -> LightGains | None:
+        """Return the same for cells, which answer rays: many lamps by runs (`RunGains`).
+
+        rays: To every lamp, if there are few.
+        """
         if not self.many:
             return self.new_gains(len(points))
         lights = self._state.scene.lights
@@ -189,4 +192,5 @@ class DirectLight:
         numbers = np.array([number for number, _ in lamps], dtype=np.int32)[order]
         channels = (3,) if self._state.caster.for_lamps.tinted else ()
         chosen = [lamps[row][1] for row in order]
-        return RunGains(points.points, points.normals, chosen, numbers, channels)
+        runs = min(RUNS * rays, MOST_RUNS)
+        return RunGains(points.points, points.normals, chosen, numbers, runs, channels)

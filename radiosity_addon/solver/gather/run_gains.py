@@ -11,12 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...lights import Lamp, LampTable
-from ...numerics import Array
+from ...lights import Lamp, LampGroup, LampTable
+from ...numerics import Array, Stream, stratified_square
+from ...rays import RayCaster, passing_light
+from .footprints import SpreadPoints
 from .light_gains import LightGains, alike
 
-MOST_RUNS = 64
-"""Runs of lamps, at most: what a cell keeps and its rays do not grow with the number of lamps."""
+RUNS, MOST_RUNS = 32, 128
+"""Runs of lamps, for each ray that few lamps would get, and at most: what a cell keeps, and its rays, do not
+grow with the number of lamps."""
 
 BLOCK_PAIRS = 1 << 16
 """Pairs of point and lamp evaluated at a time: their temporaries stay in the processor's cache."""
@@ -37,13 +40,18 @@ class RunGains(LightGains):
     STORED = ("count", "gain_of", "lamps", "numbers", "points", "normals", "seen")
 
     def __init__(
-        self, points: Array, normals: Array, lamps: Sequence[Lamp], numbers: Array, channels: tuple[int, ...]
+        self,
+        points: Array,
+        normals: Array,
+        lamps: Sequence[Lamp],
+        numbers: Array,
+        runs: int,
+        channels: tuple[int, ...],
     ) -> None:
         super().__init__(len(points))
         self.lamps, self.numbers = tuple(lamps), numbers
         self.points, self.normals = points.astype(np.float32), normals.astype(np.float32)
-        runs = min(len(lamps), MOST_RUNS)
-        self.seen = np.zeros((len(points), runs, *channels), dtype=np.uint8)
+        self.seen = np.zeros((len(points), min(len(lamps), runs), *channels), dtype=np.uint8)
 
     @property
     def nbytes(self) -> int:
@@ -54,12 +62,6 @@ class RunGains(LightGains):
     def run_of(self) -> Array:
         """(m,) int: which run each lamp is in."""
         return np.asarray(np.arange(len(self.lamps)) * self.seen.shape[1] // max(len(self.lamps), 1))
-
-    def see(self, run: int, share: Array) -> None:
-        """Keep how much of a run points see: (n,), or (n, 3) by channel."""
-        if share.ndim < self.seen.ndim - 1:
-            share = share[:, None]
-        self.seen[:, run] = np.rint(WHOLE * np.clip(share, 0.0, 1.0))
 
     def of(self, light: int) -> Array:
         """Return (n,) or (n, 3) float32: the gain of a light; 0 of one that is not here."""
@@ -96,7 +98,7 @@ class RunGains(LightGains):
 
     def _like(self, others: LightGains, points: Array, normals: Array, seen: Array) -> RunGains:
         """Return gains of the same lamps at other points."""
-        result = RunGains(points[:0], normals[:0], self.lamps, self.numbers, self.seen.shape[2:])
+        result = RunGains(points[:0], normals[:0], self.lamps, self.numbers, 0, self.seen.shape[2:])
         result.count, result.gain_of = len(points), others.gain_of
         result.points, result.normals, result.seen = points, normals, seen
         return result
@@ -139,6 +141,28 @@ class RunGains(LightGains):
         for channel in range(3):
             total[:, channel] += np.bincount(point, own[:, channel], minlength=self.count)
         return total
+
+
+def seen_of_run(
+    caster: RayCaster, group: LampGroup, spread: SpreadPoints, run: int, seed: int, part: slice
+) -> Array:
+    """Return (r,) or (r, 3) uint8 what points see of lamps, by a ray to one of them, chosen by what it adds.
+
+    run: Chooses the point of the footprint that the ray starts from.
+    """
+    at = spread.at
+    center, normal = at.points[part], at.normals[part]
+    unit = stratified_square(at.keys[part], 1, seed + Stream.SHADOW_RAYS)
+    directions, distances, weights = group.shadow_rays(center, normal, unit)
+    rows = np.flatnonzero(weights[:, 0] > 0)
+    start = spread.points(part)[rows, run % spread.count]
+    along = distances[rows, 0, None] * directions[rows, 0] - (start - center[rows])
+    length = np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)
+    start += caster.surface_offset * normal[rows]
+    free = passing_light(caster, start, along / length[:, None], length)
+    seen = np.zeros((len(center), *free.shape[1:]), dtype=np.uint8)
+    seen[rows] = np.rint(WHOLE * free)
+    return seen
 
 
 def joined_gains(parts: Sequence[LightGains]) -> LightGains:
