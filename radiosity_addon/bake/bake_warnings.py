@@ -9,8 +9,10 @@ import numpy as np
 from ..base import BakeWarning
 from ..lightmap.texels import TexelGeometry, is_collapsed
 from ..lightmap.unwrap import greedy_object, share_of
+from ..lights import Emitter
 from ..scene import BakeObject, BakeScene, Scene, coincident_triangles
 from ..solver import Solution, SolverSettings
+from ..solver.element_transport import Relightable
 from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
 
@@ -119,3 +121,19 @@ def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarni
             )
         )
     return tuple(warnings)
+
+
+def of_kept_lamps(relightable: Relightable | None) -> tuple[BakeWarning, ...]:
+    """Say if so many lamps are kept apart that each has fewer shadow rays than one alone needs."""
+    part = 0.0 if relightable is None else relightable.local.direct.part
+    if relightable is None or not 0.0 < part < 1.0:
+        return ()
+    lamps = sum(isinstance(light, Emitter) for light in relightable.sources.lights)
+    return (
+        BakeWarning(
+            "scene",
+            f"{lamps:,} lamps are kept for relighting and share the shadow rays of {part * lamps:,.0f}: with "
+            "all of them lit that does not show, but shadows of single lamps are noisier than in a bake of these",
+            is_note=True,
+        ),
+    )

@@ -27,7 +27,7 @@ from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
-from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
+from .bake_warnings import coincident_counts, of_coincident, of_kept_lamps, of_solution, small_objects
 from .estimate import estimate_of, refuse_before_unwrapping
 from .layout import lay_out, padding
 from .levels import with_levels
@@ -76,7 +76,7 @@ DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
 
 LAMPS_PER_RAY = 16
-"""More lamps than so many for each shadow ray of one are grouped, unless their lights are kept apart: one by
+"""More lamps than so many for each shadow ray of one are grouped, or share rays if they are kept apart: one by
 one each asks two rays at least, together they ask 64 times as many as one where most of them disagree."""
 
 PICTURE_SECONDS = 0.25
@@ -99,7 +99,7 @@ def bake_and_keep(
 ) -> tuple[BakeResult, KeptBake]:
     """Bake lightmaps, and keep what relighting needs (`kept_bake.py`).
 
-    Every lamp gets all its shadow rays, also those that are dark now, so that scenes of
+    Every lamp gets shadow rays of its own, also those that are dark now, so that scenes of
     many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
 
     Raises UsageError if the method keeps no links, or the quantity is the residual.
@@ -160,6 +160,7 @@ def _bake(
         *atlas.warnings,
         *of_turned_faces(bake_scene, baked, solution, geometry, lit.light),
         *of_solution(solution, quality.solver),
+        *of_kept_lamps(lit.relightable),
     )
     solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
