@@ -132,8 +132,8 @@ def of_kept_lamps(relightable: Relightable | None) -> tuple[BakeWarning, ...]:
     return (
         BakeWarning(
             "scene",
-            f"{lamps:,} lamps are kept for relighting and share the shadow rays of {part * lamps:,.0f}: with "
-            "all of them lit that does not show, but shadows of single lamps are noisier than in a bake of these",
+            f"{lamps:,} lamps are kept for relighting and share the shadow rays of {part * lamps:,.0f}: that "
+            "does not show with all of them lit, but one alone has noisier shadows than in a bake of it",
             is_note=True,
         ),
     )

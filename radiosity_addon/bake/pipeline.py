@@ -76,8 +76,8 @@ DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
 
 LAMPS_PER_RAY = 16
-"""More lamps than so many for each shadow ray of one are grouped, or share rays if they are kept apart: one by
-one each asks two rays at least, together they ask 64 times as many as one where most of them disagree."""
+"""More lamps than so many for each shadow ray of one are grouped, or share rays if they are kept apart: alone
+each asks two rays at least, together they ask 64 times as many as one where most of them disagree."""
 
 PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...lights import Emitter, Lamp, LampGroup, LampTable, light_strengths
+from ...lights import Emitter, Lamp, LampTable, light_strengths
 from ...numerics import SHADOW_STEP, Array, Scratch, Stream, fill_chunks, tiles
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..state import SolverState
@@ -21,7 +21,7 @@ from .footprints import CHUNK_POINTS, SPREAD, Footprints, SpreadPoints
 from .group_shadows import shadow_share
 from .light_gains import CompactGains, LightGains
 from .lone_shadows import SHARED_STARTS, LoneShadowShare, one_lamp
-from .run_gains import MOST_RUNS, RUNS, RunGains, seen_of_run
+from .run_gains import ASKED, MOST_RUNS, RUNS, RunGains, seen_of_run
 from .soft_shadows import ShadowShare
 
 NEAR_FACTOR = 0.05
@@ -158,9 +158,10 @@ class DirectLight:
         state, caster, runs = self._state, self._state.caster.for_lamps, gains.run_of
         seed = state.settings.seed + Stream.LAMP_SHADOWS
         for run, part in progress.each(list(range(gains.seen.shape[1]))):
-            members = tuple(gains.lamps[row] for row in np.flatnonzero(runs == run))
-            group = LampGroup(members, np.ones((len(members), 3)))
-            see = partial(seen_of_run, caster, group, spread, run, seed + SHADOW_STEP * run)
+            lamps = [gains.lamps[row] for row in np.flatnonzero(runs == run)]
+            parts = -(-len(lamps) // ASKED)
+            tables = [LampTable(lamps[first::parts]) for first in range(parts)]
+            see = partial(seen_of_run, caster, tables, spread, run, seed + SHADOW_STEP * run)
             seen = gains.seen[:, run]
             fill_chunks(see, seen, len(seen), CHUNK_POINTS, state.settings.threads, part)
 

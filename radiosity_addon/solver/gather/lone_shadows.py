@@ -16,7 +16,7 @@ from ...lights import Emitter, LampGroup
 from ...numerics import Array, marked, row_numbers, tiles
 from ...rays import RayCaster
 from .footprints import SpreadPoints
-from .soft_shadows import PENUMBRA_STEPS, ShadowShare, _mean
+from .soft_shadows import ShadowShare, _mean
 
 SHARED_STARTS = 16
 """Points of a footprint that rays to all lamps start from: making them takes longer than a ray."""
@@ -35,6 +35,9 @@ MOST_FIRST = 4
 
 PROBES = 4
 """Times as many rays find out whether an edge crosses a texel next to one."""
+
+STEPS = 2
+"""How far, in neighbors, an edge is followed from where a ray a point found it."""
 
 ENOUGH = 2.0
 """Lamps up to this many times the number from which they are many have all these rays; more share them."""
@@ -89,7 +92,7 @@ class LoneShadowShare(ShadowShare):
         edge = (near(bright) & near(facing & ~bright)) | near(partial)
         probes = np.minimum(many, PROBES * first)
         waiting = facing & (many > first)
-        for _, turn in zip(range(PENUMBRA_STEPS), progress.turns(0.5), strict=False):
+        for _, turn in zip(range(STEPS), progress.turns(0.5), strict=False):
             rows = row_numbers(edge & waiting)
             if len(rows) == 0:
                 break

@@ -11,18 +11,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...lights import Lamp, LampGroup, LampTable
+from ...lights import Emitter, LampTable
 from ...numerics import Array, Stream, stratified_square
 from ...rays import RayCaster, passing_light
-from .footprints import SpreadPoints
+from .footprints import CHUNK_POINTS, SpreadPoints
 from .light_gains import LightGains, alike
 
-RUNS, MOST_RUNS = 32, 128
+RUNS, MOST_RUNS = 64, 128
 """Runs of lamps, for each ray that few lamps would get, and at most: what a cell keeps, and its rays, do not
 grow with the number of lamps."""
 
 BLOCK_PAIRS = 1 << 16
 """Pairs of point and lamp evaluated at a time: their temporaries stay in the processor's cache."""
+
+ASKED = 8
+"""Lamps of a run that a point chooses from, about."""
 
 WHOLE = 255.0
 """What stands for all of a run."""
@@ -43,7 +46,7 @@ class RunGains(LightGains):
         self,
         points: Array,
         normals: Array,
-        lamps: Sequence[Lamp],
+        lamps: Sequence[Emitter],
         numbers: Array,
         runs: int,
         channels: tuple[int, ...],
@@ -144,25 +147,38 @@ class RunGains(LightGains):
 
 
 def seen_of_run(
-    caster: RayCaster, group: LampGroup, spread: SpreadPoints, run: int, seed: int, part: slice
+    caster: RayCaster, tables: Sequence[LampTable], spread: SpreadPoints, run: int, seed: int, part: slice
 ) -> Array:
     """Return (r,) or (r, 3) uint8 what points see of lamps, by a ray to one of them, chosen by what it adds.
 
+    tables: The run's lamps, in parts: all points of a chunk choose from one of these.
     run: Chooses the point of the footprint that the ray starts from.
     """
-    at = spread.at
-    center, normal = at.points[part], at.normals[part]
-    unit = stratified_square(at.keys[part], 1, seed + Stream.SHADOW_RAYS)
-    directions, distances, weights = group.shadow_rays(center, normal, unit)
-    rows = np.flatnonzero(weights[:, 0] > 0)
+    at, table = spread.at, tables[part.start // CHUNK_POINTS % len(tables)]
+    center, normal, keys = at.points[part], at.normals[part], at.keys[part]
+    place = stratified_square(keys, 1, seed + Stream.SHADOW_RAYS)[:, 0]
+    choice = stratified_square(keys, 1, seed + Stream.SHADOW_STARTS)[:, 0, :1]
+    lamp: Array = np.empty(len(center), dtype=np.int64)
+    lit = np.empty(len(center), dtype=bool)
+    step = max(BLOCK_PAIRS // len(table), 1)
+    for first in range(0, len(center), step):
+        block = slice(first, first + step)
+        sums = np.cumsum(table.afar(center[block], normal[block])[0], axis=1)
+        lamp[block] = (sums <= choice[block] * sums[:, -1:]).sum(axis=1)
+        lit[block] = sums[:, -1] > 0.0
+    rows = np.flatnonzero(lit)
+    lamp = np.minimum(lamp[rows], len(table) - 1)
+    directions, distances, weights = table.rays(lamp, center[rows], normal[rows], place[rows])
+    there = np.flatnonzero(weights > 0.0)
+    rows, directions, distances = rows[there], directions[there], distances[there]
     start = spread.points(part)[rows, run % spread.count]
-    along = distances[rows, 0, None] * directions[rows, 0] - (start - center[rows])
+    along = distances[:, None] * directions - (start - center[rows])
     length = np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)
     start += caster.surface_offset * normal[rows]
     free = passing_light(caster, start, along / length[:, None], length)
     seen = np.zeros((len(center), *free.shape[1:]), dtype=np.uint8)
     seen[rows] = np.rint(WHOLE * free)
-    return seen
+    return np.asarray(seen)
 
 
 def joined_gains(parts: Sequence[LightGains]) -> LightGains:
