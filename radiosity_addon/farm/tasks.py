@@ -26,7 +26,7 @@ KERNELS = frozenset(
         "solver.gather.group_shadows:_first_rays",
         "solver.gather.group_shadows:_learned_rays",
         "solver.gather.retracing:_retrace",
-        "solver.gather.run_gains:seen_of_run",
+        "solver.gather.run_gains:_seen_of_run",
         "solver.gather.soft_shadows:_shadowed",
         "lightmap.points.interpolation:_fitted",
         "lightmap.points.smoothing:_alike",

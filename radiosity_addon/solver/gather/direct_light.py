@@ -8,20 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Emitter, Lamp, LampTable, light_strengths
-from ...numerics import SHADOW_STEP, Array, Scratch, Stream, fill_chunks, tiles
+from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..state import SolverState
-from .footprints import CHUNK_POINTS, SPREAD, Footprints, SpreadPoints
+from .footprints import SPREAD, Footprints, SpreadPoints
 from .group_shadows import shadow_share
 from .light_gains import CompactGains, LightGains
 from .lone_shadows import SHARED_STARTS, LoneShadowShare, one_lamp
-from .run_gains import ASKED, MOST_RUNS, RUNS, RunGains, seen_of_run
+from .run_gains import MOST_RUNS, RUNS, RunGains, ask_runs
 from .soft_shadows import ShadowShare
 
 NEAR_FACTOR = 0.05
@@ -85,7 +84,9 @@ class DirectLight:
             progress, of_runs = progress.part(0.0, 0.3), progress.part(0.3, 1.0)
             in_runs = set(gains.numbers.tolist())
             lights = [query for query in lights if query.number not in in_runs]
-            self._see_runs(gains, spread, of_runs)
+            settings, caster = self._state.settings, self._state.caster.for_lamps
+            seed = settings.seed + Stream.LAMP_SHADOWS
+            ask_runs(gains, caster, spread, seed, settings.threads, of_runs)
             total += gains.irradiance(light_strengths(self._state.scene.lights))
         for query, part in progress.each(lights):
             arriving = self._arriving(query, spread, rays, part)
@@ -152,18 +153,6 @@ class DirectLight:
         for rows in tiles(len(gain)):
             gain[rows] *= unblocked[rows]
         return gain
-
-    def _see_runs(self, gains: RunGains, spread: SpreadPoints, progress: Progress) -> None:
-        """Find what points see of runs of lamps, by a ray for each run."""
-        state, caster, runs = self._state, self._state.caster.for_lamps, gains.run_of
-        seed = state.settings.seed + Stream.LAMP_SHADOWS
-        for run, part in progress.each(list(range(gains.seen.shape[1]))):
-            lamps = [gains.lamps[row] for row in np.flatnonzero(runs == run)]
-            parts = -(-len(lamps) // ASKED)
-            tables = [LampTable(lamps[first::parts]) for first in range(parts)]
-            see = partial(seen_of_run, caster, tables, spread, run, seed + SHADOW_STEP * run)
-            seen = gains.seen[:, run]
-            fill_chunks(see, seen, len(seen), CHUNK_POINTS, state.settings.threads, part)
 
     def lit_by(self, gains: LightGains) -> Array:
         """Return (n, 3) what arrives [W/m²] by gains, of the strengths that the sources have."""

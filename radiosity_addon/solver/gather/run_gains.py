@@ -8,11 +8,13 @@ byte. What a lamp adds unoccluded is made again whenever its strength is known.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from ...base import Progress
 from ...lights import Emitter, LampTable
-from ...numerics import Array, Stream, stratified_square
+from ...numerics import SHADOW_STEP, Array, Stream, fill_chunks, stratified_square
 from ...rays import RayCaster, passing_light
 from .footprints import CHUNK_POINTS, SpreadPoints
 from .light_gains import LightGains, alike
@@ -146,7 +148,20 @@ class RunGains(LightGains):
         return total
 
 
-def seen_of_run(
+def ask_runs(
+    gains: RunGains, caster: RayCaster, spread: SpreadPoints, seed: int, threads: int, progress: Progress
+) -> None:
+    """Find what points see of runs of lamps, by a ray for each run."""
+    run_of = gains.run_of
+    for run, part in progress.each(list(range(gains.seen.shape[1]))):
+        lamps = [gains.lamps[row] for row in np.flatnonzero(run_of == run)]
+        parts = -(-len(lamps) // ASKED)
+        tables = [LampTable(lamps[first::parts]) for first in range(parts)]
+        ask = partial(_seen_of_run, caster, tables, spread, run, seed + SHADOW_STEP * run)
+        fill_chunks(ask, gains.seen[:, run], gains.count, CHUNK_POINTS, threads, part)
+
+
+def _seen_of_run(
     caster: RayCaster, tables: Sequence[LampTable], spread: SpreadPoints, run: int, seed: int, part: slice
 ) -> Array:
     """Return (r,) or (r, 3) uint8 what points see of lamps, by a ray to one of them, chosen by what it adds.
