@@ -70,7 +70,7 @@ class LoneShadowShare(ShadowShare):
         facing = marked(count, lambda tile: gain[tile] > 0)
         mean = sum(float(gain[tile].sum()) for tile in tiles(count)) / max(count, 1)
         first, many = np.empty((2, count), dtype=np.int16)
-        least, most = FIRST_RAYS * self._part * rays, RAYS * np.sqrt(self._part) * rays
+        least, most = FIRST_RAYS * self._part * rays, RAYS * self._part * rays
         for tile in tiles(count):
             bright = (gain[tile] / max(mean, 1e-300)) ** 0.8
             first[tile] = _power_of_two(least * bright, MOST_FIRST * rays if near is not None else rays)
