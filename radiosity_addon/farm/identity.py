@@ -27,10 +27,10 @@ def identity() -> dict[str, str]:
 
 
 def _digest_of_code() -> str:
-    """Return a digest of all modules that kernels are made of."""
+    """Return a digest of all modules that the pipeline and its kernels are made of."""
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.blake2b(digest_size=8)
-    for room in (*ROOMS, "base", "options", "farm"):
+    for room in (*ROOMS, "base", "options", "bake", "farm"):
         for path in sorted((root / room).rglob("*.py")):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()

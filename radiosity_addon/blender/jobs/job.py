@@ -12,7 +12,7 @@ import bpy
 from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pages, run_pipeline, timed
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
-from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
+from ...base import BakeWarning, NothingToDoError, Progress, Status, in_thread, staged
 from ...farm import ShareRecord
 from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
@@ -26,7 +26,6 @@ from ..images.images import possible_names
 from ..relight import lightmap_versions
 from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
-from ..session.background import in_thread
 from .finish import BakeJob, Copies, Scope, applying, finish
 from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
