@@ -170,10 +170,13 @@ class _Found:
 
 
 @contextmanager
-def shared_bake(spool: Spool, helpers: Helpers | None = None) -> Iterator[ShareRecord]:
-    """Share what is baked within through a spool, which is emptied when it ends well.
+def shared_bake(
+    spool: Spool, helpers: Helpers | None = None, *, emptied: bool = True
+) -> Iterator[ShareRecord]:
+    """Share what is baked within through a spool.
 
     helpers: Started here, and ended whatever happens.
+    emptied: Remove what is in the spool when the bake ends well.
     Yields what is given away.
     """
     executor = FolderExecutor(spool)
@@ -181,6 +184,9 @@ def shared_bake(spool: Spool, helpers: Helpers | None = None) -> Iterator[ShareR
         with run_by(executor), giving_signs(spool.sign), helped(spool, helpers):
             yield executor.record
         executor.record.problems += [] if helpers is None else helpers.problems
-        spool.end()
+        if emptied:
+            spool.end()
+        else:
+            spool.say_over()
     finally:
         spool.leave()

@@ -21,7 +21,7 @@ def identity() -> dict[str, str]:
         "version": _digest_of_code(),
         "Python": platform.python_version(),
         "NumPy": np.__version__,
-        "embreex": _version("embreex"),
+        "embreex": version_of("embreex"),
         "instruction set": f"{platform.machine()} {' '.join(_instructions())}".strip(),
     }
 
@@ -36,7 +36,8 @@ def _digest_of_code() -> str:
     return digest.hexdigest()
 
 
-def _version(package: str) -> str:
+def version_of(package: str) -> str:
+    """Return the version of a package that is installed; "none" if it is not."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -12,8 +12,9 @@ from pathlib import Path
 from ..base import BakeError
 from .executor import shared_bake
 from .helpers import Helpers
+from .prepared import PREPARED
 from .records import ShareRecord
-from .spool import Spool
+from .spool import FINISHED, RECORD, Spool
 
 ENDING = "-spool"
 
@@ -30,15 +31,44 @@ def given_spool(path: Path) -> Iterator[Spool]:
 
     Raises BakeError as `Spool.to_bake` does.
     """
-    was_there = path.exists()
-    spool = Spool.to_bake(path)
-    try:
+    with _there_again(path):
+        if (path.expanduser() / PREPARED).exists():
+            raise BakeError(f"a bake is prepared in '{path}': run and finish it, or give another folder")
+        spool = Spool.to_bake(path)
+        with suppress(FileNotFoundError):
+            (spool.path / FINISHED).unlink()
         with _kept_with_results(spool):
             yield spool
+
+
+@contextmanager
+def spool_to_prepare(path: Path) -> Iterator[Spool]:
+    """Yield a spool to prepare a bake in; after an error one that was made for it is removed.
+
+    Raises BakeError as `Spool.made` does.
+    """
+    was_spool = (path.expanduser() / RECORD).exists()
+    with _there_again(path):
+        spool = Spool.made(path)
+        try:
+            yield spool
+        except BaseException:
+            if not was_spool:
+                spool.remove()
+            raise
+
+
+@contextmanager
+def _there_again(path: Path) -> Iterator[None]:
+    """Make a folder again after an error that was there before."""
+    path = path.expanduser()
+    was_there = path.is_dir()
+    try:
+        yield
     except BaseException:
         if was_there:
             with suppress(OSError):
-                spool.path.mkdir(exist_ok=True)
+                path.mkdir(exist_ok=True)
         raise
 
 

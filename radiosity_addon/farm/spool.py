@@ -36,6 +36,8 @@ from .spool_store import Array, SpoolStore, explained, not_written
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
 
+RECORD, FINISHED = "spool.json", "finished"
+
 _FOLDERS = ("arrays", "objects", "calls", "results", "aside")
 _OURS = re.compile(
     r"(arrays/[0-9a-f]{40}\.npy|objects/[0-9a-f]{40}\.json|calls/[0-9a-f]{40}/(call\.json|\d+\.(claim|result))"
@@ -73,7 +75,7 @@ class Spool(SpoolStore):
             if spool.path.exists() and not spool.path.is_dir():
                 raise BakeError(f"'{spool.path}' is no folder: give an empty folder")
             spool.path.mkdir(parents=True, exist_ok=True)
-            record = spool.path / "spool.json"
+            record = spool.path / RECORD
             if not record.exists():
                 # A bake that was killed at its start may have left what it was writing.
                 if not all(_OURS.fullmatch(path.name) for path in spool.path.iterdir()):
@@ -130,7 +132,7 @@ class Spool(SpoolStore):
 
     def last_sign(self) -> float:
         """Return when a bake was last known to go on here [s since 1970]. Raises OSError if none ever was."""
-        sign = self.sign if self.sign.exists() else self.path / "spool.json"
+        sign = self.sign if self.sign.exists() else self.path / RECORD
         return sign.stat().st_mtime
 
     @classmethod
@@ -142,7 +144,7 @@ class Spool(SpoolStore):
 
     def check(self) -> None:
         """Refuse what is no spool, or one of another program: its bytes would differ."""
-        path, record = self.path / "spool.json", self._record()
+        path, record = self.path / RECORD, self._record()
         if record is None:
             if path.exists():
                 raise BakeError(f"'{path}' is damaged: give the bake an empty folder")
@@ -164,7 +166,7 @@ class Spool(SpoolStore):
     def _record(self) -> dict[str, Any] | None:
         """Return what a spool says of itself; None if that is not there or damaged."""
         try:
-            record = json.loads((self.path / "spool.json").read_bytes())
+            record = json.loads((self.path / RECORD).read_bytes())
         except (OSError, ValueError, RecursionError):
             return None
         return record if isinstance(record, dict) and record.get("kind") == KIND else None
@@ -266,6 +268,10 @@ class Spool(SpoolStore):
             return (self._at("calls", digest) / f"{task}.result").stat().st_size
         return 0
 
+    def note(self, name: str, text: str) -> None:
+        """Write a short text for other processes."""
+        self._write(self.path / name, text.encode())
+
     def end(self) -> None:
         """Tell all workers that the bake has ended, and remove what it left."""
         self.say_over()
@@ -286,7 +292,7 @@ class Spool(SpoolStore):
         """Remove the spool with all that we wrote; the folder stays if it holds anything else."""
         with contextlib.suppress(OSError, BakeError):
             self.end()
-        for name in ("open", "baking", "over", "prepared", "finished", "spool.json"):
+        for name in ("open", "baking", "over", "prepared", "finished", RECORD):
             with contextlib.suppress(OSError):
                 (self.path / name).unlink()
         with contextlib.suppress(OSError):
@@ -298,4 +304,4 @@ class Spool(SpoolStore):
 
     def is_over(self) -> bool:
         """Return whether the bake has ended."""
-        return (self.path / "over").exists() or not (self.path / "spool.json").exists()
+        return (self.path / "over").exists() or not (self.path / RECORD).exists()

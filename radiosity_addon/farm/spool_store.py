@@ -86,9 +86,14 @@ class SpoolStore:
             raise ObjectError(f"array {digest} is damaged")
         return array
 
-    def _at(self, folder: str, digest: str, suffix: str = "") -> Path:
+    @staticmethod
+    def check_digest(digest: Any) -> None:
+        """Refuse what is no digest. Raises ObjectError."""
         if not isinstance(digest, str) or not DIGEST.fullmatch(digest):
             raise ObjectError("a name that is no digest")
+
+    def _at(self, folder: str, digest: str, suffix: str = "") -> Path:
+        self.check_digest(digest)
         return self.path / folder / f"{digest}{suffix}"
 
     def pointer(self, name: str) -> str | None:
