@@ -21,6 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from ..rays import RayCount
 from .recent import Recent
 
 Array = npt.NDArray[Any]
@@ -102,10 +103,14 @@ class DigestsAlone:
 
 
 class Writer:
-    """Writes a value, and the objects and arrays it holds, to a store."""
+    """Writes a value, and the objects and arrays it holds, to a store.
+
+    ray_counts: Those of the casters among them, by the names that they get.
+    """
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self.ray_counts: dict[str, RayCount] = {}
         self._known: dict[int, Tree] = {}
         self._open: set[int] = set()
         self._alive: list[Any] = []
@@ -159,6 +164,9 @@ class Writer:
         self._store.put_object(digest, text)
         self._known[id(value)] = {"object": digest}
         self._alive.append(value)
+        if (count := _ray_count(value)) is not None:
+            count.name = digest
+            self.ray_counts[digest] = count
         return self._known[id(value)]
 
 
@@ -229,6 +237,8 @@ class Reader:
             raise ObjectError(f"'{name}' is no class")
         result: Any = object.__new__(kind)
         restore_state(result, None if state is None else self._value(state))
+        if (count := _ray_count(result)) is not None:
+            count.name = digest
         return self._known.put(digest, result)
 
 
@@ -285,6 +295,12 @@ def restore_state(value: Any, state: Any) -> None:
         return
     for name, part in state.items():
         object.__setattr__(value, name, part)
+
+
+def _ray_count(value: Any) -> RayCount | None:
+    """Return a caster's count of rays; None of anything else."""
+    count = getattr(value, "__dict__", {}).get("own_rays")
+    return count if isinstance(count, RayCount) else None
 
 
 def _inherited(kind: type) -> set[str]:

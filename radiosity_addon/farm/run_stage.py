@@ -27,7 +27,7 @@ def run(path: Path, farm: FarmSpec | None, console: Console, interrupts: Interru
     prepared = prepared_in(spool)
     console.progress("read", 0.0)
     inputs = BakeInputs.read(spool, prepared.inputs)
-    if StoredResult.is_whole(spool, prepared.inputs, inputs.bake_scene):
+    if StoredResult.is_whole(spool, prepared.inputs, inputs.bake_scene, inputs.settings):
         console.lines([f"the result is in '{spool.path}' already: there is nothing to run; finish it"])
         return
     with wanted_helpers(farm) as helpers:

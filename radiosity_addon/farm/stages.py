@@ -13,7 +13,9 @@ from ..bake import BakePlan, Baking, KeepOptions, plan_bake
 from ..bake.relight import KeptBake
 from ..bake.result import BakeResult
 from ..bake.scene_diff import Part, compare, scene_record
+from ..bake.sidecar import sidecar_entry
 from ..base import SILENT, BakeError, Progress
+from ..numerics import ArrayFileError
 from .executor import shared_bake
 from .helpers import Helpers
 from .pipeline_sharing import shared_pipeline
@@ -141,11 +143,15 @@ def _known(
             f"the scene is not as it was prepared from '{prepared.source}'{what}: prepare and run it again"
         )
     try:
-        result = stored.result(plan.bake_scene)
+        result = stored.result(plan.bake_scene, plan.settings)
     except UNREADABLE as error:
         raise damaged_result(spool) from error
     if sidecar is not None:
         stored.write_sidecar(sidecar)
+        try:
+            sidecar_entry(sidecar, "")
+        except ArrayFileError as error:
+            raise damaged_result(spool) from error
     progress.stage("read", 1.0, 1.0).at(1.0)
     return result, None
 

@@ -19,6 +19,7 @@ from ..bake.result import BakedObject, BakeResult, LightGroup
 from ..bake.sidecar import check_result
 from ..base import BakeError
 from ..numerics import Array
+from ..options import BakeSettings
 from ..scene import BakeScene
 from .objects import ObjectError, Reader, Writer, digest_of
 from .prepared import UNREADABLE
@@ -58,22 +59,22 @@ class StoredResult:
         return cls(mark, sidecar, stored["result"])
 
     @classmethod
-    def is_whole(cls, spool: Spool, inputs: str, bake_scene: BakeScene) -> bool:
+    def is_whole(cls, spool: Spool, inputs: str, bake_scene: BakeScene, settings: BakeSettings) -> bool:
         """Return whether there is a result for some inputs, of this scene, that is not damaged."""
         try:
-            cls.read(spool, inputs).result(bake_scene)
+            cls.read(spool, inputs).result(bake_scene, settings)
         except UNREADABLE:
             return False
         return True
 
-    def result(self, bake_scene: BakeScene) -> BakeResult:
+    def result(self, bake_scene: BakeScene, settings: BakeSettings) -> BakeResult:
         """Return the result of a bake of this scene. Raises ValueError and others if it is of another one."""
         stored, items = self._stored, {item.name: item for item in bake_scene.objects}
         objects = tuple(BakedObject(items[name], *facts) for name, *facts in stored["objects"])
         groups = tuple(LightGroup(*group) for group in stored["groups"])
         others = {name: stored[name] for name in (*AS_THEY_ARE, *PLAIN)}
         found = BakeResult(objects=objects, groups=groups, **others)
-        check_result(found)
+        check_result(found, bake_scene, settings)
         return found
 
     def write_sidecar(self, path: Path) -> None:

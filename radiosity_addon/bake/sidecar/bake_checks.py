@@ -13,8 +13,9 @@ import numpy as np
 from ...base import BakeWarning
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
-from ...options import MAX_RESOLUTION
+from ...options import MAX_PAGES, MAX_RESOLUTION, OTHERS, BakeSettings
 from ...scene import CHANNELS, BakeObject, BakeScene, LevelOfDetail, Scene, SurfaceImages
+from ..relight import are_wanted
 from ..result import BakedObject, BakeResult, LightGroup
 from .sidecar_checks import check_light, check_plain
 from .value_checks import LARGE, array_of, instance, integers, number, numbers, require, whole
@@ -47,8 +48,9 @@ def check_bake_scene(bake_scene: Any) -> None:
             number(float(coordinate), -LARGE)
 
 
-def check_result(result: BakeResult) -> None:
-    """Refuse what no bake has found; errors as of `check_bake_scene`."""
+def check_result(result: BakeResult, bake_scene: BakeScene, settings: BakeSettings) -> None:
+    """Refuse what no bake of this scene has found; errors as of `check_bake_scene`."""
+    _check_number_of_files(result, bake_scene, settings)
     for page in instance(result.pages, tuple):
         _check_page(page, None)
     for baked in instance(result.objects, tuple):
@@ -71,6 +73,20 @@ def check_result(result: BakeResult) -> None:
         instance(name, str)
         whole(triangles, 0, MOST_INDEX)
     check_plain(instance(result.performance, dict))
+
+
+def _check_number_of_files(result: BakeResult, bake_scene: BakeScene, settings: BakeSettings) -> None:
+    """Refuse more pages and groups than were foreseen when it was seen which files may be written."""
+    baked = sum(item.bake and item.count > 0 for item in bake_scene.objects)
+    most = settings.pages if settings.atlas == "shared" else baked
+    if settings.atlas == "shared" and settings.texel_density is not None:
+        most = max(MAX_PAGES, baked)  # what density they need is known when they are unwrapped
+    require(1 <= len(instance(result.pages, tuple)) <= most, "too many pages")
+    of_scene = (*bake_scene.light_groups, *bake_scene.emitter_groups)
+    names = {OTHERS, *(name for name, _ in settings.groups), *of_scene} - {""}
+    wanted = names if are_wanted(bake_scene, settings) else set()
+    found = [group.name for group in instance(result.groups, tuple)]
+    require(len(set(found)) == len(found) and wanted.issuperset(found), "other groups")
 
 
 def _check_scene(scene: Scene) -> None:
