@@ -47,9 +47,16 @@ def spool_to_prepare(path: Path) -> Iterator[Spool]:
 
     Raises BakeError as `Spool.made` does.
     """
-    was_spool = (path.expanduser() / RECORD).exists()
+    spool = Spool(path)
+    was_there, was_spool = spool.path.exists(), (spool.path / RECORD).exists()
     with _there_again(path):
-        spool = Spool.made(path)
+        try:
+            spool = Spool.made(path)
+        except BaseException:
+            if not was_there:
+                with suppress(OSError):
+                    spool.path.rmdir()
+            raise
         try:
             yield spool
         except BaseException:

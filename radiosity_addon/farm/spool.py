@@ -275,6 +275,10 @@ class Spool(SpoolStore):
     def end(self) -> None:
         """Tell all workers that the bake has ended, and remove what it left."""
         self.say_over()
+        self._empty()
+
+    def _empty(self) -> None:
+        """Remove what bakes left."""
         self.leave()
         left = [path for path in self.path.glob(".*") if path.is_file()]
         for folder in (self.path / name for name in _FOLDERS):
@@ -291,7 +295,9 @@ class Spool(SpoolStore):
     def remove(self) -> None:
         """Remove the spool with all that we wrote; the folder stays if it holds anything else."""
         with contextlib.suppress(OSError, BakeError):
-            self.end()
+            self.say_over()  # as long as the disk is not full
+        with contextlib.suppress(OSError):
+            self._empty()
         for name in ("open", "baking", "over", "prepared", "finished", RECORD):
             with contextlib.suppress(OSError):
                 (self.path / name).unlink()

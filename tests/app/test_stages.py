@@ -43,7 +43,7 @@ sys.exit(code)
 CASES = {
     "plain": [],
     "pages": ["--atlas", "per-object", "--format", "png16", "--quantity", "irradiance"],
-    "density": ["--texel-density", "10", "--max-resolution", "64", "--sky"],
+    "density": ["--texel-density", "10", "--max-resolution", "128", "--sky"],
     "dense": ["--method", "dense", "--elements", "200"],
     "residual": ["--quantity", "residual"],
     "groups": ["--light-group", "Lamps=Bulb", "--keep"],
