@@ -59,7 +59,9 @@ def build_parser(prog: str) -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(dest="verb", required=True)
     run = verbs.add_parser("run", help="bake what `prepare` has put into a spool", allow_abbrev=False)
     run.add_argument("spool", type=Path, metavar="DIR")
-    run.add_argument("--farm", metavar="SPEC", help="start workers: local:N on this machine, or tls://HOST:PORT")
+    run.add_argument(
+        "--farm", metavar="SPEC", help="start workers: local:N on this machine, or tls://HOST:PORT"
+    )
     run.add_argument("--quiet", action="store_true", help="print errors only")
     worker = verbs.add_parser(
         "worker", help="do tasks of a bake with --spool DIR until it has ended", allow_abbrev=False

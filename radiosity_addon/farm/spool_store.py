@@ -168,6 +168,4 @@ def explained(path: Path) -> Iterator[None]:
 def not_written(path: Path, error: OSError) -> BakeError:
     """Return the error for a spool that cannot be written to."""
     why = error.strerror or "its disk may be full"  # NumPy tells no more
-    return BakeError(
-        f"cannot write to spool '{path}': {why}; see to it and start again"
-    )
+    return BakeError(f"cannot write to spool '{path}': {why}; see to it and start again")

@@ -83,9 +83,7 @@ def bake_prepared(
 
 
 @contextmanager
-def finishing(
-    spool: Spool, prepared: PreparedBake, stored: StoredResult, output: Path
-) -> Iterator[Baking]:
+def finishing(spool: Spool, prepared: PreparedBake, stored: StoredResult, output: Path) -> Iterator[Baking]:
     """Yield what takes the pipeline's place where a prepared bake is finished into a folder.
 
     If that ends well, the spool is emptied.

@@ -38,6 +38,5 @@ def run(argv: list[str]) -> int:
         return run_command(argv, f"blender -b --command {COMMAND}")
     from .main import main
 
-
     loaded = Path(bpy.data.filepath) if bpy.data.filepath else None
     return main(argv, prog=f"blender -b FILE --command {COMMAND}", loaded=loaded)
