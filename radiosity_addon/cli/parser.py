@@ -121,9 +121,10 @@ def _add_prepare(parser: argparse.ArgumentParser) -> None:
     _add_scene(parser)
     _add_spool(parser, "the folder that the bake is prepared in, empty or new")
     of_bake = (BAKE_COMMAND[name] for name in PREPARED_OPTIONS)
-    _add_options(parser, (*of_bake, *EVERY_EXPORT.values(), *EVERY_COMMAND.values()))
+    of_all = (option for name, option in EVERY_COMMAND.items() if name != "overwrite")
+    _add_options(parser, (*of_bake, *EVERY_EXPORT.values(), *of_all))
     _add_settings(parser)
-    parser.set_defaults(check=False, relight=False, plot=None, farm=None)
+    parser.set_defaults(check=False, relight=False, plot=None, farm=None, overwrite=False)
 
 
 def _add_finish(parser: argparse.ArgumentParser) -> None:

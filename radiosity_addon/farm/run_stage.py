@@ -11,7 +11,7 @@ from .helper_choice import wanted_helpers
 from .prepared import BakeInputs, prepared_in
 from .spool import Spool
 from .stages import bake_prepared, finished_into
-from .stored_result import StoredResult
+from .stored_result import StoredResult, forget_result
 
 
 def run(path: Path, farm: FarmSpec | None, console: Console, interrupts: Interrupts) -> None:
@@ -32,6 +32,7 @@ def run(path: Path, farm: FarmSpec | None, console: Console, interrupts: Interru
         return
     with wanted_helpers(farm) as helpers:
         spool = Spool.to_bake(path)
+        forget_result(spool, prepared.inputs)
         try:
             job = in_thread(partial(bake_prepared, spool, prepared.inputs, inputs, helpers), False)
             run_through(job, console, interrupts)

@@ -41,10 +41,10 @@ def stage_of(spool: Spool) -> Stage | None:
     prepared = PreparedBake.read(spool)
     if prepared is None:
         return None
-    if other_baker(spool.sign) is not None:
-        return "running"
     if has_result(spool, prepared.inputs):
         return "ready to finish"
+    if other_baker(spool.sign) is not None:
+        return "running"
     return "interrupted" if spool.has_results() else "prepared"
 
 
@@ -136,9 +136,12 @@ def _known(
     progress.stage("read", 0.0, 1.0).at(0.0)
     inputs = BakeInputs(plan.bake_scene, plan.settings, keeping is not None)
     if inputs.digest() != prepared.inputs:
-        what = _changes(spool, prepared, inputs)
+        what, source = _changes(spool, prepared, inputs), prepared.source
+        imported = not source.startswith("<") and not source.lower().endswith(".blend")
+        # Blender 5.0 orders the corners of an .obj's faces differently from time to time if some are double.
+        advice = ", or if it was not changed, save it as a .blend first" if imported else ""
         raise BakeError(
-            f"the scene is not as it was prepared from '{prepared.source}'{what}: prepare and run it again"
+            f"the scene is not as it was prepared from '{source}'{what}: prepare and run it again{advice}"
         )
     try:
         result = stored.result(plan.bake_scene, plan.settings)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import uuid
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from ..scene import BakeScene
 from .objects import ObjectError, Reader, Writer, digest_of
 from .prepared import UNREADABLE
 from .spool import Spool
-from .spool_store import not_written
+from .spool_store import explained, not_written
 
 FOLDER = "results"
 
@@ -110,6 +111,12 @@ def write_result(spool: Spool, inputs: str, result: BakeResult, mark: str, sidec
     digest = digest_of(text)
     spool.put_object(digest, text)
     spool.point(f"{FOLDER}/{inputs}", digest)
+
+
+def forget_result(spool: Spool, inputs: str) -> None:
+    """Forget the result for some inputs, which is damaged. Raises BakeError if it cannot be removed."""
+    with explained(spool.path), suppress(FileNotFoundError):
+        (spool.path / FOLDER / inputs).unlink()
 
 
 def has_result(spool: Spool, inputs: str) -> bool:

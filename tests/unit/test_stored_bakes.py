@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from radiosity_addon.bake import plan_bake
 from radiosity_addon.bake.result import BakeResult
-from radiosity_addon.base import BakeError
+from radiosity_addon.base import SILENT, BakeError
 from radiosity_addon.cli import Console, Interrupts
 from radiosity_addon.farm import (
     BakeInputs,
@@ -29,13 +30,13 @@ from radiosity_addon.farm import (
 )
 from radiosity_addon.farm.objects import Writer, digest_of
 from radiosity_addon.farm.run_stage import run
-from radiosity_addon.farm.stages import bake_prepared, finished_into, stage_of
+from radiosity_addon.farm.stages import bake_prepared, finished_into, finishing, stage_of
 from radiosity_addon.farm.stored_result import StoredResult
 from radiosity_addon.farm.worker import wait_for
 from radiosity_addon.lights import PointLight
 from radiosity_addon.options import BakeSettings
 from tests.glass_rooms import glazed_room
-from tests.moved_rooms import room
+from tests.moved_rooms import ELSEWHERE, room
 
 SETTINGS = BakeSettings(resolution=32, quality="sketch", threads=1)
 
@@ -308,6 +309,29 @@ def test_results_that_no_bake_finds_are_refused(
         spool.point(f"results/{prepared.inputs}", put(spool, tree))
         with pytest.raises(BakeError, match="is damaged"):
             result_in(Spool(spool.path), prepared)
+
+
+@pytest.mark.parametrize(
+    ("source", "advice"),
+    [
+        ("/home/me/room.blend", "prepare and run it again"),
+        (
+            "/home/me/room.OBJ",
+            "prepare and run it again, or if it was not changed, save it as a .blend first",
+        ),
+    ],
+)
+def test_another_scene_is_not_finished(
+    source: str, advice: str, spool: Spool, inputs: BakeInputs, tmp_path: Path
+) -> None:
+    store_prepared(spool, inputs, PreparedBake("", SETTINGS, source=source))
+    prepared = prepared_in(spool)
+    bake_prepared(spool, prepared.inputs, inputs, None)
+    stored = result_in(spool, prepared)
+    other = plan_bake(room(ELSEWHERE), SETTINGS, None, None)
+    message = rf"^the scene is not as it was prepared from '{source}' \(object 'Box' has moved.*\): {advice}$"
+    with finishing(spool, prepared, stored, tmp_path) as baking, pytest.raises(BakeError, match=message):
+        baking(other, None, None, SILENT)
 
 
 def test_another_xatlas_is_refused(
