@@ -12,9 +12,8 @@ from pathlib import Path
 from ..base import BakeError
 from .executor import shared_bake
 from .helpers import Helpers
-from .prepared import PREPARED
 from .records import ShareRecord
-from .spool import FINISHED, RECORD, Spool
+from .spool import FINISHED, PREPARED, RECORD, Spool
 
 ENDING = "-spool"
 

@@ -17,9 +17,7 @@ from ..options import BakeSettings, Form, forms_of
 from ..scene import BakeScene
 from .identity import version_of
 from .objects import DigestsAlone, ObjectError, Reader, Store, Writer, digest_of
-from .spool import Spool
-
-PREPARED = "prepared"
+from .spool import PREPARED, Spool
 
 UNREADABLE = (*DAMAGED, RadiosityError)
 """What reading what another process has written can raise."""

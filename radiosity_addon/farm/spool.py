@@ -36,7 +36,7 @@ from .spool_store import Array, SpoolStore, explained, not_written
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
 
-RECORD, FINISHED = "spool.json", "finished"
+RECORD, PREPARED, FINISHED = "spool.json", "prepared", "finished"
 
 _FOLDERS = ("arrays", "objects", "calls", "results", "aside")
 _OURS = re.compile(
@@ -118,7 +118,7 @@ class Spool(SpoolStore):
         record = self._record()
         if record is None:
             return self.path.is_dir() and all(_OURS.fullmatch(path.name) for path in self.path.iterdir())
-        if not self.is_made_for(output):
+        if not self.is_made_for(output) or (self.path / PREPARED).exists():
             return False
         refuse_second_bake(self.sign)
         if record.get("program") != identity():
@@ -298,7 +298,7 @@ class Spool(SpoolStore):
             self.say_over()  # as long as the disk is not full
         with contextlib.suppress(OSError):
             self._empty()
-        for name in ("open", "baking", "over", "prepared", "finished", RECORD):
+        for name in ("open", "baking", "over", PREPARED, FINISHED, RECORD):
             with contextlib.suppress(OSError):
                 (self.path / name).unlink()
         with contextlib.suppress(OSError):

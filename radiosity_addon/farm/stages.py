@@ -19,9 +19,9 @@ from ..numerics import ArrayFileError
 from .executor import shared_bake
 from .helpers import Helpers
 from .pipeline_sharing import shared_pipeline
-from .prepared import PREPARED, UNREADABLE, BakeInputs, PreparedBake
+from .prepared import UNREADABLE, BakeInputs, PreparedBake
 from .signs import giving_signs, other_baker, refuse_second_bake
-from .spool import FINISHED, Spool
+from .spool import FINISHED, PREPARED, Spool
 from .spool_store import explained
 from .stored_result import StoredResult, has_result, write_result
 

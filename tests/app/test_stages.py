@@ -321,6 +321,17 @@ def test_stages_come_in_their_order(scene: Path, tmp_path: Path, capsys: pytest.
     assert status(spool).startswith("prepared: ")
 
 
+def test_a_bake_leaves_what_is_prepared_in_the_spool_that_it_had_made_for_itself(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spool = tmp_path / "out-spool"
+    Spool.to_bake(spool, made_for=tmp_path / "out").leave()
+    assert prepare(scene, spool, SMALL) == 0
+    assert bake(scene, tmp_path / "out", [*SMALL, "--farm", "local:1"]) == 1
+    assert "is in the way of the bake's spool" in capsys.readouterr().err
+    assert status(spool).startswith("prepared: ")
+
+
 def test_blender_itself_runs_the_stage(scene: Path, tmp_path: Path) -> None:
     """`blender -b --command radiosity run DIR`, where no other Python has our packages."""
     from radiosity_addon.blender.command_line import host
