@@ -126,7 +126,7 @@ class BackProbe:
         return found
 
     def _seen(self, rows: Array, side: float) -> tuple[Array, Array, Hits]:
-        """Return the middles of triangles, their normals on a side, both (n, 3), and what rays from there hit."""
+        """Return the middles of triangles, normals on a side, both (n, 3), and what rays from there hit."""
         caster = self._local.caster
         normals = side * self._scene.face_normals[rows]
         points = self._scene.triangles[rows].mean(axis=1)
