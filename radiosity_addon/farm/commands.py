@@ -68,7 +68,7 @@ def build_parser(prog: str) -> argparse.ArgumentParser:
     )
     worker.add_argument("spool", type=Path, metavar="DIR")
     worker.add_argument(
-        "--wait", type=_seconds, default=0.0, metavar="SECONDS", help="wait so long for the spool (default 0)"
+        "--wait", type=_seconds, default=0.0, metavar="SECONDS", help="wait so long for the bake (default 0)"
     )
     worker.add_argument(
         "--idle",
