@@ -39,6 +39,8 @@ USAGE = """\
 usage: python3 build.py VERB [arguments]
 
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
+  prepare [SCENE] --spool DIR, finish [SCENE] --spool DIR --output DIR
+                             the first and the last stage of a bake that is run without Blender in between
   restore SCENE [options]    take a bake out of a .blend again
   export DIR [options]       export a bake for browsers and engines
   test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
@@ -67,6 +69,8 @@ def main(arguments: list[str]) -> int:
     verb, rest = arguments[0], arguments[1:]
     verbs = {
         "bake": bake,
+        "prepare": prepare,
+        "finish": finish,
         "export": export,
         "restore": restore,
         "test": test,
@@ -97,6 +101,16 @@ def main(arguments: list[str]) -> int:
 def bake(arguments: list[str]) -> int:
     """Bake with the command line of the add-on, which says where everything is."""
     return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "bake", *arguments)
+
+
+def prepare(arguments: list[str]) -> int:
+    """Prepare a bake with the command line of the add-on."""
+    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "prepare", *arguments)
+
+
+def finish(arguments: list[str]) -> int:
+    """Finish a bake that was prepared and run with the command line of the add-on."""
+    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "finish", *arguments)
 
 
 def export(arguments: list[str]) -> int:

@@ -68,6 +68,8 @@ class Case:
         Radiance to light a scene with [W/m²/sr].
     minutes : float
         After which a bake of ours or Cycles' is given up.
+    smart_uvs : bool
+        Whether Blender's Smart UV Project lays out the page, whose few large islands suit a denoiser.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Case:
     lamp: Lamp | None = None
     sky: tuple[float, float, float] | None = None
     minutes: float = 20.0
+    smart_uvs: bool = False
 
     @property
     def file(self) -> Path | None:
@@ -114,6 +117,8 @@ class Case:
             if self.lamp is None
             else [self.lamp.kind, self.lamp.place, self.lamp.energy, self.lamp.radius]
         )
+        if self.smart_uvs:
+            about.append("smart")
         digest.update(json.dumps(about, sort_keys=True).encode())
         return f"{self.name}-{self.resolution}-{digest.hexdigest()[:12]}"
 
@@ -142,6 +147,10 @@ CASES = {
         Case("apartment", "Apartment, sun and sky", "apartment", 512, (16, 64, 256), 256),
         _file("staircase", "The Wooden Staircase (Wig42)", "staircase/staircase.blend"),
         _file("classroom", "Japanese Classroom (NovaZeeke), matte", "classroom/classroom-matte.blend"),
+        Case("apartment-smart", "Apartment on Smart UVs", "apartment", 512, (16, 64, 256), 256,
+             smart_uvs=True),
+        _file("classroom-smart", "Japanese Classroom on Smart UVs", "classroom/classroom-matte.blend",
+              smart_uvs=True),
         _file("sponza", "Sponza (Dabrovic)", "sponza/sponza.blend"),
         _file("bevy-mixed", "Mixed lighting (Bevy)", "bevy-mixed/MixedLightingExample.gltf"),
         _file("platformer", "Platformer (Armory)", "platformer/platformer.blend"),

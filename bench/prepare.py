@@ -23,7 +23,7 @@ from .cases import CASES, SMALL_CASES, Case, Lamp
 from .flatten import flatten
 from .interior.homes import build_apartment, build_living_room
 from .interior.office import build_office
-from .layout import lay_out, write_layout
+from .layout import lay_out, project_smart, write_layout
 
 INTERIORS = {"interior": build_office, "living-room": build_living_room, "apartment": build_apartment}
 
@@ -49,6 +49,8 @@ def prepare(job: dict[str, Any]) -> dict[str, Any]:
     golden = _build(case)
     layout = golden.uv if golden is not None else lay_out(case.resolution)
     write_layout(layout)
+    if case.smart_uvs:
+        project_smart(bpy.context.scene, case.resolution)
     folder.mkdir(parents=True, exist_ok=True)
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), compress=True)

@@ -1,24 +1,24 @@
 // Not run in Flamenco yet: checked against Flamenco 3's documentation and built-in job types, and by a test in Node.js.
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// A Flamenco 3 job type: bake a file's lightmaps on one machine, with workers on others at the same time.
+// A Flamenco 3 job type: bake a file's lightmaps in stages, the middle one with workers on other machines.
 // Put it into the folder `scripts` next to flamenco-manager; see docs/several-machines.md.
 
 const JOB_TYPE = {
     label: "Radiosity Lightmaps",
-    description: "Bake lightmaps on one machine, with the help of others",
+    description: "Prepare a bake, run it with the help of other machines, and finish it",
     settings: [
         { key: "output", label: "Output Folder", type: "string", subtype: "dir_path", required: true,
           visible: "submission",
           description: "Folder in shared storage that the lightmaps, the baked file and the report go to" },
         { key: "helpers", label: "Helping Machines", type: "int32", default: 4, propargs: {min: 1, max: 1000},
           visible: "submission",
-          description: "Machines that help the one that bakes, each in a task of its own" },
+          description: "Machines that help the one that runs the bake, each in a task of its own" },
         { key: "processes", label: "Workers per Machine", type: "int32", default: 0, propargs: {min: 0, max: 1000},
           visible: "submission",
           description: "Worker processes on each helping machine. 0: one on each core" },
         { key: "options", label: "More Options", type: "string", default: "--quality medium", visible: "submission",
-          description: "Options of the command line's bake, such as: --resolution 2048 --quality high" },
+          description: "Options of the command line's prepare, such as: --resolution 2048 --quality high" },
 
         // Known without asking.
         { key: "blendfile", type: "string", required: true, visible: "web",
@@ -31,7 +31,7 @@ const JOB_TYPE = {
 // Seconds that helpers wait for the bake to begin.
 const WAIT = "3600";
 
-// The bake's task comes first: with one machine, helpers would else wait for it in vain. Flamenco's own are 50.
+// The bake's own tasks come first: with one machine, helpers would else wait for it in vain. Flamenco's own are 50.
 const FIRST = 60;
 
 function compileJob(job) {
@@ -39,39 +39,44 @@ function compileJob(job) {
     const output = settings.output.replace(/[\/\\]+$/, "");
     // A new one for each job, next to the output, whose folder is the bake's own.
     settings.spool = `${output}-spool-${formatTimestampLocal(job.created)}`;
-    job.addTask(bakeTask(settings, output));
+    const prepare = withScene("prepare", settings, shellSplit(settings.options || ""));
+    const run = withSpool("run", ["run", settings.spool], FIRST);
+    run.addDependency(prepare);
+    const finish = withScene("finish", settings, ["--output", output]);
+    finish.addDependency(run);
+    job.addTask(prepare);
+    job.addTask(run);
+    // Helpers are to work while the bake runs, and end with it.
     for (let number = 1; number <= settings.helpers; number++) {
-        job.addTask(helperTask(settings, number));
+        const words = ["worker", settings.spool, "--wait", WAIT, "--processes", String(settings.processes)];
+        const help = withSpool(`help-${number}`, words);
+        help.addDependency(prepare);
+        job.addTask(help);
     }
+    job.addTask(finish);
 }
 
-function bakeTask(settings, output) {
-    const task = author.Task("bake", "blender");
+// A stage that needs the scene.
+function withScene(verb, settings, options) {
+    const task = author.Task(verb, "blender");
     task.priority = FIRST;
     task.addCommand(author.Command("blender-render", {
         exe: "{blender}",
         exeArgs: "{blenderArgs}",
         argsBefore: ["--background"],
         blendfile: settings.blendfile,
-        args: [
-            "--command", "radiosity", "bake",
-            "--output", output,
-            "--spool", settings.spool,
-        ].concat(shellSplit(settings.options || "")),
+        args: ["--command", "radiosity", verb, "--spool", settings.spool].concat(options),
     }));
     return task;
 }
 
-// No task depends on another: helpers are to run while the bake does, and end with it.
-function helperTask(settings, number) {
-    const task = author.Task(`help-${number}`, "blender");
+// What needs the spool alone; bytes depend on Python's and NumPy's versions, so it is done by the same Blender.
+function withSpool(name, words, priority) {
+    const task = author.Task(name, "blender");
+    if (priority) task.priority = priority;
     task.addCommand(author.Command("exec", {
         exe: "{blender}",
-        args: [
-            "--background", "--command", "radiosity", "worker", settings.spool,
-            "--wait", WAIT,
-            "--processes", String(settings.processes),
-        ],
+        args: ["--background", "--command", "radiosity"].concat(words),
     }));
     return task;
 }

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from .bake_warnings import coincident_counts, of_coincident
-from .estimate import Estimate, LightmappedObject, estimate_bake
+from .estimate import Estimate, LightmappedObject, estimate_bake, refuse_bake
 from .importance import may_thin_out, thinned_out
-from .keep import KeepOptions, can_keep, run_pipeline
+from .keep import Baking, KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .scene_memory import refuse_many_triangles
 from .stages import timed
@@ -19,6 +19,7 @@ __all__ = [
     "SHORT",
     "BakeDigests",
     "BakePlan",
+    "Baking",
     "Estimate",
     "KeepOptions",
     "LightmappedObject",
@@ -33,6 +34,7 @@ __all__ = [
     "pages_of",
     "plan_bake",
     "process_bytes",
+    "refuse_bake",
     "refuse_large_pages",
     "refuse_many_triangles",
     "run_pipeline",

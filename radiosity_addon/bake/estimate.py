@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base import SceneError, UsageError
 from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, page_size
 from ..lights import Lamp
 from ..numerics import Array, give_back, thread_count
@@ -20,6 +21,7 @@ from ..options import BakeSettings
 from ..scene import BakeScene
 from ..solver.state import lit_sides
 from .importance import Extent, justified_scales, may_thin_out
+from .relight import are_wanted, check_groups
 from .scene_memory import refuse_many_triangles, solving_bytes, waiting_bytes
 from .texel_memory import least_bytes, pages_of, process_bytes, refuse_large_pages, room
 
@@ -252,11 +254,20 @@ def _thinned(objects: Sequence[LightmappedObject], settings: BakeSettings) -> li
     )
 
 
-def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse scenes and pages that will not fit into the memory limit, as far as areas give their size.
+def refuse_bake(bake_scene: BakeScene, settings: BakeSettings, *, keep: bool) -> None:
+    """Refuse what cannot be baked, as far as that is known before unwrapping: areas tell the pages' size.
 
-    Raises UsageError: See `refuse_many_triangles` and `refuse_large_pages`.
+    Raises SceneError if no object is to get a lightmap.
+    Raises UsageError if the bake cannot be kept as wanted, its light groups do not fit the scene, or it will
+        not fit into the memory limit (`refuse_many_triangles`, `refuse_large_pages`).
     """
+    grouped = are_wanted(bake_scene, settings)
+    if (keep or grouped) and settings.quantity == "residual":
+        raise UsageError("a residual is of all light together: bake another quantity to relight it")
+    if grouped:
+        check_groups(bake_scene, settings)
+    if not any(item.bake and item.count for item in bake_scene.objects):
+        raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
     faces = lit_sides(bake_scene.scene)
     give_back()  # what the export freed, and finding closed solids
     refuse_many_triangles(len(bake_scene.scene), faces, settings)

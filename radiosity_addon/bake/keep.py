@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import uuid
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 from ..base import SILENT, Progress
 from ..options import BakeSettings
@@ -28,6 +30,12 @@ class KeepOptions:
     sidecar: bool = False
     mark: str = field(default_factory=lambda: uuid.uuid4().hex)
     earlier: KeptBake | None = field(default=None, repr=False, compare=False)
+
+
+Baking: TypeAlias = Callable[
+    [BakePlan, KeepOptions | None, Path | None, Progress], tuple[BakeResult, KeptBake | None]
+]
+"""`run_pipeline`, or what takes its place: the same shared with workers, or a result that is known."""
 
 
 def can_keep(settings: BakeSettings) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base import SILENT, BakeError, Progress, SceneError, UsageError
+from ..base import SILENT, BakeError, Progress
 from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages
 from ..lightmap.lighting import (
     LightSoFar,
@@ -28,7 +28,7 @@ from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
 from .bake_warnings import coincident_counts, of_coincident, of_kept_lamps, of_solution, small_objects
-from .estimate import estimate_of, refuse_before_unwrapping
+from .estimate import estimate_of, refuse_bake
 from .layout import lay_out, padding
 from .levels import with_levels
 from .quality import MOST_RAYS, for_error, quality_of, used_settings
@@ -37,7 +37,6 @@ from .relight import (
     IncrementalState,
     KeptBake,
     are_wanted,
-    check_groups,
     group_pages,
     held_values,
 )
@@ -113,17 +112,9 @@ def _bake(
     bake_scene: BakeScene, settings: BakeSettings, keep: bool, progress: Progress
 ) -> tuple[BakeResult, KeptBake | None]:
     """Bake, and keep what relighting needs if asked to."""
-    if keep and settings.quantity == "residual":
-        raise UsageError("a residual is of all light together: bake another quantity to relight it")
-    if are_wanted(bake_scene, settings):
-        check_groups(bake_scene, settings)
     seconds = StageTimes()
-    quality = quality_of(settings)
-    baked = baked_objects(bake_scene)
-    if not baked:
-        raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
-
-    refuse_before_unwrapping(bake_scene, settings)
+    refuse_bake(bake_scene, settings, keep=keep)
+    quality, baked = quality_of(settings), baked_objects(bake_scene)
     plan = estimate_of(bake_scene, settings)
     stages = plan.stages
     unwrapping, rasterizing, rest = progress.expecting([stages.unwrap, stages.rasterize, sum(stages[2:])])

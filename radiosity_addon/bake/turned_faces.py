@@ -1,8 +1,9 @@
-"""Objects lit from behind only: lightmaps hold the light on fronts, so theirs are black.
+"""Objects lit from behind: lightmaps hold the light on fronts, so theirs are dark.
 
 A wall whose normals point out of its room, or a bathtub whose normals point inward, looks right in every
 render, as both sides of a surface show, and black once it is baked. Somebody who does not know that will look
-for a leak.
+for a leak. The front of a picture's frame that faces the wall it hangs on is not quite black: some light gets
+into the gap.
 
 Closed objects that are inside out are found by their shape alone, also before a bake. For all others it takes
 light. The solver's elements are too coarse for this: inside a thin shell they get a tenth of the light around
@@ -19,13 +20,17 @@ from ..base import BakeWarning
 from ..lightmap.texels import TexelGeometry
 from ..lightmap.transport import TexelLight
 from ..numerics import Array, Stream, cosine_hemisphere, stratified_square, tiles, to_world
-from ..rays import NO_HIT
+from ..rays import NO_HIT, Hits
 from ..scene import BakeObject, BakeScene, Scene, inside_out, places, wound_parts
 from ..solver import Solution
 from ..solver.gather import Footprints, LocalPass
 
 DARK = 0.05
 """A front that gets less than this part of its back's light, and of usual light, is dark, …"""
+
+DIM, HIDDEN, WITHIN = 0.5, 0.9, 0.25
+"""So is one that gets less than this part of its back's light if at least so much of what it faces is within
+this part of the root of its part's area, …"""
 
 SEEN = 0.1
 """… if the back gets at least this part of usual light."""
@@ -57,7 +62,7 @@ def of_turned_faces(
     geometry: TexelGeometry,
     light: TexelLight | None,
 ) -> Iterator[BakeWarning]:
-    """Warn of objects that are inside out, and of others that are lit from behind only.
+    """Warn of objects that are inside out, and of others that are lit from behind.
 
     What shines is not dark on its front: a closed bulb is as bright inside as its own light makes it.
     """
@@ -105,16 +110,30 @@ class BackProbe:
 
     def lit(self, rows: Array, least: float) -> Array:
         """Return (n,) whether the backs of triangles face lit surfaces, or lamps give them `least` [W/m²]."""
+        points, normals, hits = self._seen(rows, -1.0)
+        is_open = (hits.front | (hits.triangle == NO_HIT)).reshape(-1, PROBES).mean(axis=1) >= OPEN
+        direct = self._local.direct.at(Footprints(points, normals, rows)).max(axis=1)
+        return np.asarray(is_open | (direct > least))
+
+    def hidden(self, rows: Array, reach: Array) -> Array:
+        """Return (n,) whether the fronts of triangles face hardly anything beyond `reach`, (n,) [m]."""
+        found = np.zeros(len(rows), dtype=bool)
+        for first in range(0, len(rows), PROBED_AT_ONCE):
+            chunk = slice(first, first + PROBED_AT_ONCE)
+            _, _, hits = self._seen(rows[chunk], 1.0)
+            near = hits.distance.reshape(-1, PROBES) < reach[chunk, None]
+            found[chunk] = near.mean(axis=1) >= HIDDEN
+        return found
+
+    def _seen(self, rows: Array, side: float) -> tuple[Array, Array, Hits]:
+        """Return the middles of triangles, normals on a side, both (n, 3), and what rays from there hit."""
         caster = self._local.caster
-        normals = -self._scene.face_normals[rows]
+        normals = side * self._scene.face_normals[rows]
         points = self._scene.triangles[rows].mean(axis=1)
         unit = stratified_square(rows, PROBES, Stream.BACK_PROBES)
         directions = to_world(cosine_hemisphere(unit), normals).reshape(-1, 3)
         starts = np.repeat(points + 2.0 * caster.surface_offset * normals, PROBES, axis=0)
-        hits = caster.intersect(starts, directions)
-        is_open = (hits.front | (hits.triangle == NO_HIT)).reshape(-1, PROBES).mean(axis=1) >= OPEN
-        direct = self._local.direct.at(Footprints(points, normals, rows)).max(axis=1)
-        return np.asarray(is_open | (direct > least))
+        return points, normals, caster.intersect(starts, directions)
 
 
 def turned_away(
@@ -131,10 +150,18 @@ def turned_away(
     levels = [float(area @ lit[item.rows] / area.sum()) for item, area in of]
     # A median over objects: a ground in the sun is a hundred times as bright and large as a room.
     usual = float(np.quantile(levels, 0.5, method="higher")) if levels else 0.0
-    dark = (front < DARK * np.minimum(back, usual)) & (back > SEEN * usual)
+    seen = back > SEEN * usual
+    dark, dim = seen & (front < DARK * np.minimum(back, usual)), seen & (front < DIM * back)
     found: list[tuple[float, BakeWarning]] = []
     for item, area in of:
+        if float(area @ (dark | dim)[item.rows]) <= MAX_TURNED_SHARE * float(area.sum()):
+            continue
         suspects = item.first + np.flatnonzero(dark[item.rows])
+        part = wound_parts(places(scene.triangles[item.rows]))
+        others = np.flatnonzero((dim & ~dark)[item.rows])
+        reach = WITHIN * np.sqrt(np.bincount(part, area)[part[others]])
+        hidden = item.first + others[probe.hidden(item.first + others, reach)]
+        suspects = np.sort(np.append(suspects, hidden))
         share = float(areas[suspects].sum() / area.sum())
         if share <= MAX_TURNED_SHARE:
             continue
@@ -145,10 +172,10 @@ def turned_away(
         if share > MAX_TURNED_SHARE:
             turned = suspects[probe.all_lit(suspects, SEEN * usual)] - item.first
             unlit = lit[item.rows] <= SEEN * usual
-            polygons = turned_polygons(item, scene.triangles[item.rows], area, turned, unlit)
+            polygons = turned_polygons(item, part, area, turned, unlit)
             ways = "Flip Faces in the panel, or " * bool(polygons) + "Mesh → Normals → Flip"
             message = (
-                f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
+                f"object '{item.name}' is lit from behind on {share:.0%} of its surface: normals point "
                 f"away from the light, so its lightmap is dark there; flip them ({ways}) if that side should "
                 "be visible"
             )
@@ -158,19 +185,18 @@ def turned_away(
 
 
 def turned_polygons(
-    item: BakeObject, triangles: Array, areas: Array, turned: Array, unlit: Array
+    item: BakeObject, part: Array, areas: Array, turned: Array, unlit: Array
 ) -> tuple[int, ...]:
     """Return the polygons of an object that are to be flipped, in ascending order.
 
     Parts whose faces go on facing one way stay so: each is flipped as a whole, or not at all.
 
-    triangles (count, 3, 3), areas (count,) [m²]: The object's.
-    turned (n,) int: Its triangles that are lit from behind only.
+    part (count,) int, areas (count,) [m²]: Of the object's triangles; parts as in `wound_parts`.
+    turned (n,) int: Its triangles that are lit from behind.
     unlit (count,) bool: Those that get hardly any light on either side, and so decide nothing.
     """
     is_turned = np.zeros(item.count, dtype=bool)
     is_turned[turned] = True
-    part = wound_parts(places(triangles))
     of_part = np.bincount(part, areas * is_turned)
     decided = np.bincount(part, areas * (is_turned | ~unlit))
     flips = ((of_part > 0) & (of_part >= MOSTLY * decided))[part]

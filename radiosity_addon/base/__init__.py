@@ -5,6 +5,7 @@ Needs nothing but Python.
 
 from __future__ import annotations
 
+from .background import elsewhere, in_thread
 from .bake_warning import BakeWarning
 from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, UsageError
 from .progress import SILENT, Cancelled, Expected, Progress, Status
@@ -28,6 +29,8 @@ __all__ = [
     "UsageError",
     "drain",
     "duration",
+    "elsewhere",
+    "in_thread",
     "linear_ticks",
     "one_of_each",
     "staged",

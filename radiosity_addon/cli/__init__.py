@@ -6,7 +6,8 @@ Needs neither Blender nor NumPy.
 from __future__ import annotations
 
 from .console import Console, summary
-from .farm_spec import FarmSpec
+from .endings import OUT_OF_MEMORY, fail, with_notes
+from .farm_spec import FarmSpec, read_farm_spec
 from .interrupts import Interrupts
 from .parser import (
     bake_output,
@@ -16,11 +17,13 @@ from .parser import (
     check_sharing,
     requested_settings,
 )
-from .path_checks import check_folder, printable
+from .path_checks import check_folder, escaped, printable, quoted
 from .permissions import Permissions
+from .running import run_through
 from .temporary_folder import TemporaryFolder
 
 __all__ = [
+    "OUT_OF_MEMORY",
     "Console",
     "FarmSpec",
     "Interrupts",
@@ -32,7 +35,13 @@ __all__ = [
     "check_keeping",
     "check_plot",
     "check_sharing",
+    "escaped",
+    "fail",
     "printable",
+    "quoted",
+    "read_farm_spec",
     "requested_settings",
+    "run_through",
     "summary",
+    "with_notes",
 ]

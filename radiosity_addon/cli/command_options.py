@@ -102,6 +102,12 @@ class _EveryCommand:
 BAKE_COMMAND = options_of(_BakeCommand)
 """Options of the command `bake` by their name in the parsed request."""
 
+PREPARED_OPTIONS = ("keep", "export", "no_preview")
+"""Those of them that `prepare` takes, …"""
+
+FINISH_OPTIONS = ("output", "report", "plot")
+"""… and `finish`: what says which files may be written is asked for where they are written."""
+
 EXPORT_COMMAND = options_of(_ExportCommand)
 """Options of the command `export`."""
 

@@ -29,7 +29,7 @@ class FarmSpec:
     scheduler: str = ""
 
 
-def farm_spec(text: str) -> FarmSpec:
+def read_farm_spec(text: str) -> FarmSpec:
     """Read who is to help. Raises UsageError if nobody can be meant."""
     if text.startswith(LOCAL):
         return FarmSpec(workers=_count(text))

@@ -12,8 +12,15 @@ from typing import Any, NoReturn
 
 from ..base import UsageError
 from ..options import METHODS, OPTIONS, SECTIONS, BakeSettings, GroupSetting, Option, plain
-from .command_options import BAKE_COMMAND, EVERY_COMMAND, EVERY_EXPORT, EXPORT_COMMAND
-from .farm_spec import farm_spec
+from .command_options import (
+    BAKE_COMMAND,
+    EVERY_COMMAND,
+    EVERY_EXPORT,
+    EXPORT_COMMAND,
+    FINISH_OPTIONS,
+    PREPARED_OPTIONS,
+)
+from .farm_spec import read_farm_spec
 from .path_checks import checked_folder, checked_name, checked_path
 
 BUNDLED_OUTPUT = Path("out/cornell")
@@ -23,8 +30,10 @@ BUNDLED_OUTPUT = Path("out/cornell")
 def build_parser(prog: str) -> argparse.ArgumentParser:
     """Return the parser of all commands; it raises `UsageError` where argparse would exit."""
     parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,export,restore}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,prepare,finish,export,restore}")
     _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
+    _add_prepare(verbs.add_parser("prepare", help="store a bake to run without Blender", allow_abbrev=False))
+    _add_finish(verbs.add_parser("finish", help="show and write what such a bake found", allow_abbrev=False))
     _add_export(verbs.add_parser("export", help="export a bake for engines", allow_abbrev=False))
     _add_restore(verbs.add_parser("restore", help="take the lightmaps out again", allow_abbrev=False))
     return parser
@@ -54,12 +63,12 @@ def light_group(text: str) -> GroupSetting:
 
 
 def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
-    """Return where the bake goes: a scene needs --output, the bundled one has a default."""
+    """Return where a bake goes: a scene needs --output, the bundled one has a default."""
     given: Path | None = request.output
     if given is not None:
         return given
     if request.scene is not None or loaded is not None:
-        raise UsageError("bake needs --output DIR, the folder everything is written to")
+        raise UsageError(f"{request.verb} needs --output DIR, the folder everything is written to")
     return BUNDLED_OUTPUT
 
 
@@ -82,7 +91,7 @@ def check_sharing(request: argparse.Namespace) -> None:
             if given and getattr(request, option) is not None:
                 raise UsageError(f"{flag} traces no rays, so there is nothing to share: leave --{option} out")
     if request.farm is not None:
-        request.farm = farm_spec(request.farm)
+        request.farm = read_farm_spec(request.farm)
         if request.farm.scheduler and request.spool is None:
             raise UsageError(
                 f"--farm {request.farm.scheduler} needs --spool DIR, a folder that all machines share"
@@ -103,6 +112,29 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _add_bake(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_EXPORT.values(), *EVERY_COMMAND.values()))
+    _add_settings(parser)
+
+
+def _add_prepare(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    _add_spool(parser, "the folder that the bake is prepared in, empty or new")
+    of_bake = (BAKE_COMMAND[name] for name in PREPARED_OPTIONS)
+    of_all = (option for name, option in EVERY_COMMAND.items() if name != "overwrite")
+    _add_options(parser, (*of_bake, *EVERY_EXPORT.values(), *of_all))
+    _add_settings(parser)
+    parser.set_defaults(check=False, relight=False, plot=None, farm=None, overwrite=False)
+
+
+def _add_finish(parser: argparse.ArgumentParser) -> None:
+    _add_scene(parser)
+    _add_spool(parser, "the folder that the bake was prepared and run in")
+    of_bake = (BAKE_COMMAND[name] for name in FINISH_OPTIONS)
+    _add_options(parser, (*of_bake, *EVERY_COMMAND.values()))
+
+
+def _add_scene(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scene",
         nargs="?",
@@ -110,7 +142,13 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help=".blend, .glb, .gltf or .obj; without it the file Blender has open, or the bundled Cornell box",
     )
-    _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_EXPORT.values(), *EVERY_COMMAND.values()))
+
+
+def _add_spool(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument("--spool", type=checked_folder, required=True, metavar="DIR", help=text)
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
     for section in SECTIONS:
         options = [option for option in OPTIONS.values() if option.section == section]
         if options:

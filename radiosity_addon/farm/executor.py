@@ -60,7 +60,8 @@ class FolderExecutor:
         function: Any = work.func
         record, before = CallRecord(name_of(function)), self._spool.input_bytes
         bounds = [[piece.start, piece.stop] for piece in slices]
-        text = json.dumps({"kernel": Writer(self._store).tree(work), "slices": bounds})
+        writer = Writer(self._store)
+        text = json.dumps({"kernel": writer.tree(work), "slices": bounds})
         earlier = self._spool.done(digest_of(text))
         digest = self._spool.put_call(text)
         record.input_bytes = self._spool.input_bytes - before
@@ -68,7 +69,11 @@ class FolderExecutor:
         self.record.calls.append(record)
         try:
             for task in range(call.count):
-                yield from call.result(task, progress)
+                found = call.result(task, progress)
+                for name, rays in found.rays.items():
+                    if name in writer.ray_counts:
+                        writer.ray_counts[name].add(rays)
+                yield from found.values
                 progress.at((task + 1) / call.count)
         finally:
             self._spool.close_call()
@@ -101,7 +106,7 @@ class _SharedCall:
         """Wait for what is being done here."""
         self._pool.shutdown(cancel_futures=True)
 
-    def result(self, task: int, progress: Progress) -> list[Any]:
+    def result(self, task: int, progress: Progress) -> _Found:
         """Return what a task found: wait for it, doing others meanwhile, and this one if nobody does."""
         found = self._wait_for(task, progress)
         if task in self._earlier:
@@ -110,7 +115,7 @@ class _SharedCall:
             self._record.seconds.append(found.seconds)
             self._record.by_workers += not found.here
         self._record.result_bytes.append(self._spool.result_bytes(self._digest, task))
-        return found.values
+        return found
 
     def _wait_for(self, task: int, progress: Progress) -> _Found:
         since = time.monotonic()
@@ -135,8 +140,8 @@ class _SharedCall:
         stored = self._spool.result(self._digest, task)
         with suppress(ObjectError):
             if stored is not None:
-                values, seconds, by = values_of(*stored)
-                return _Found(values, seconds, here=by == this_process())
+                values, seconds, by, rays = values_of(*stored)
+                return _Found(values, seconds, by == this_process(), rays)
         return None
 
     def _do_free_tasks(self, first: int) -> None:
@@ -155,25 +160,33 @@ class _SharedCall:
 
     def _timed(self, task: int) -> _Found:
         started, busy = time.monotonic(), time.thread_time()
-        values = run_task(self._spool, self._digest, task, self._work, self._bounds)
+        values, rays = run_task(self._spool, self._digest, task, self._work, self._bounds)
         self._longest = max(self._longest, time.monotonic() - started)
-        return _Found(values, time.thread_time() - busy, here=True)
+        return _Found(values, time.thread_time() - busy, True, rays)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """What a task found for each of its slices, its processor seconds, and whether this process did it."""
+    """What a task found for each of its slices, and its processor seconds.
+
+    here: Whether this process did it.
+    rays: That it took, by the names of their counts.
+    """
 
     values: list[Any]
     seconds: float
     here: bool
+    rays: dict[str, int]
 
 
 @contextmanager
-def shared_bake(spool: Spool, helpers: Helpers | None = None) -> Iterator[ShareRecord]:
-    """Share what is baked within through a spool, which is emptied when it ends well.
+def shared_bake(
+    spool: Spool, helpers: Helpers | None = None, *, emptied: bool = True
+) -> Iterator[ShareRecord]:
+    """Share what is baked within through a spool.
 
     helpers: Started here, and ended whatever happens.
+    emptied: Remove what is in the spool when the bake ends well.
     Yields what is given away.
     """
     executor = FolderExecutor(spool)
@@ -181,6 +194,9 @@ def shared_bake(spool: Spool, helpers: Helpers | None = None) -> Iterator[ShareR
         with run_by(executor), giving_signs(spool.sign), helped(spool, helpers):
             yield executor.record
         executor.record.problems += [] if helpers is None else helpers.problems
-        spool.end()
+        if emptied:
+            spool.end()
+        else:
+            spool.say_over()
     finally:
         spool.leave()

@@ -21,22 +21,23 @@ def identity() -> dict[str, str]:
         "version": _digest_of_code(),
         "Python": platform.python_version(),
         "NumPy": np.__version__,
-        "embreex": _version("embreex"),
+        "embreex": version_of("embreex"),
         "instruction set": f"{platform.machine()} {' '.join(_instructions())}".strip(),
     }
 
 
 def _digest_of_code() -> str:
-    """Return a digest of all modules that kernels are made of."""
+    """Return a digest of all modules that the pipeline and its kernels are made of."""
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.blake2b(digest_size=8)
-    for room in (*ROOMS, "base", "options", "farm"):
+    for room in (*ROOMS, "base", "options", "bake", "farm"):
         for path in sorted((root / room).rglob("*.py")):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 
-def _version(package: str) -> str:
+def version_of(package: str) -> str:
+    """Return the version of a package that is installed; "none" if it is not."""
     try:
         return version(package)
     except PackageNotFoundError:

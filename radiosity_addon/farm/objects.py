@@ -21,6 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from ..rays import RayCount
 from .recent import Recent
 
 Array = npt.NDArray[Any]
@@ -32,6 +33,9 @@ PACKAGE = __name__.rpartition(".farm.")[0]
 
 ROOMS = ("numerics", "rays", "form_factors", "lights", "scene", "solver", "lightmap")
 """Rooms whose classes and functions may be named, …"""
+
+ALSO_NAMED = ("base.bake_warning:BakeWarning",)
+"""… these classes, which scenes and results hold, …"""
 
 NOT_NAMED = "lightmap.charts"
 """… except those that start processes and give meshes to xatlas, which trusts them: no kernel needs any."""
@@ -79,11 +83,34 @@ def array_digest(array: Array) -> str:
     return digest.hexdigest()
 
 
+class DigestsAlone:
+    """A store that keeps nothing: what is written to it gets the digests that it would have elsewhere."""
+
+    def put_object(self, digest: str, text: str) -> None:
+        """See `Store`."""
+
+    def put_array(self, array: Array) -> str:
+        """See `Store`."""
+        return array_digest(array)
+
+    def object(self, digest: str) -> str:
+        """See `Store`."""
+        raise ObjectError(f"object {digest} was not kept")
+
+    def array(self, digest: str) -> Array:
+        """See `Store`."""
+        raise ObjectError(f"array {digest} was not kept")
+
+
 class Writer:
-    """Writes a value, and the objects and arrays it holds, to a store."""
+    """Writes a value, and the objects and arrays it holds, to a store.
+
+    ray_counts: Those of the casters among them, by the names that they get.
+    """
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self.ray_counts: dict[str, RayCount] = {}
         self._known: dict[int, Tree] = {}
         self._open: set[int] = set()
         self._alive: list[Any] = []
@@ -137,6 +164,9 @@ class Writer:
         self._store.put_object(digest, text)
         self._known[id(value)] = {"object": digest}
         self._alive.append(value)
+        if (count := _ray_count(value)) is not None:
+            count.name = digest
+            self.ray_counts[digest] = count
         return self._known[id(value)]
 
 
@@ -207,6 +237,8 @@ class Reader:
             raise ObjectError(f"'{name}' is no class")
         result: Any = object.__new__(kind)
         restore_state(result, None if state is None else self._value(state))
+        if (count := _ray_count(result)) is not None:
+            count.name = digest
         return self._known.put(digest, result)
 
 
@@ -215,7 +247,7 @@ def name_of(what: type | FunctionType) -> str:
     module = what.__module__ or ""
     room = module.removeprefix(f"{PACKAGE}.")
     name = f"{room}:{what.__qualname__}"
-    if room == module or not _may_be_named(room) or "." in what.__qualname__:
+    if room == module or not _may_be_named(name) or "." in what.__qualname__:
         raise TypeError(f"'{module}.{what.__qualname__}' cannot be stored")
     return name
 
@@ -223,7 +255,7 @@ def name_of(what: type | FunctionType) -> str:
 def named(name: str) -> Any:
     """Return the class or function of a name. Raises ObjectError if it is none of ours."""
     room, _, what = name.partition(":")
-    if not _may_be_named(room) or not all(part.isidentifier() for part in room.split(".")):
+    if not _may_be_named(name) or not all(part.isidentifier() for part in room.split(".")):
         raise ObjectError(f"'{name}' may not be named")
     found = getattr(importlib.import_module(f"{PACKAGE}.{room}"), what, None)
     if not isinstance(found, type | FunctionType) or name_of(found) != name or _is_unsafe(found):
@@ -231,7 +263,10 @@ def named(name: str) -> Any:
     return found
 
 
-def _may_be_named(room: str) -> bool:
+def _may_be_named(name: str) -> bool:
+    room = name.partition(":")[0]
+    if name in ALSO_NAMED:
+        return True
     return room.split(".")[0] in ROOMS and not f"{room}.".startswith(f"{NOT_NAMED}.")
 
 
@@ -260,6 +295,12 @@ def restore_state(value: Any, state: Any) -> None:
         return
     for name, part in state.items():
         object.__setattr__(value, name, part)
+
+
+def _ray_count(value: Any) -> RayCount | None:
+    """Return a caster's count of rays; None of anything else."""
+    count = getattr(value, "__dict__", {}).get("own_rays")
+    return count if isinstance(count, RayCount) else None
 
 
 def _inherited(kind: type) -> set[str]:

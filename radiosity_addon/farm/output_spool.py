@@ -13,7 +13,7 @@ from ..base import BakeError
 from .executor import shared_bake
 from .helpers import Helpers
 from .records import ShareRecord
-from .spool import Spool
+from .spool import FINISHED, PREPARED, RECORD, Spool
 
 ENDING = "-spool"
 
@@ -30,15 +30,51 @@ def given_spool(path: Path) -> Iterator[Spool]:
 
     Raises BakeError as `Spool.to_bake` does.
     """
-    was_there = path.exists()
-    spool = Spool.to_bake(path)
-    try:
+    with _there_again(path):
+        if (path.expanduser() / PREPARED).exists():
+            raise BakeError(f"a bake is prepared in '{path}': run and finish it, or give another folder")
+        spool = Spool.to_bake(path)
+        with suppress(FileNotFoundError):
+            (spool.path / FINISHED).unlink()
         with _kept_with_results(spool):
             yield spool
+
+
+@contextmanager
+def spool_to_prepare(path: Path) -> Iterator[Spool]:
+    """Yield a spool to prepare a bake in; after an error one that was made for it is removed.
+
+    Raises BakeError as `Spool.made` does.
+    """
+    spool = Spool(path)
+    was_there, was_spool = spool.path.exists(), (spool.path / RECORD).exists()
+    with _there_again(path):
+        try:
+            spool = Spool.made(path)
+        except BaseException:
+            if not was_there:
+                with suppress(OSError):
+                    spool.path.rmdir()
+            raise
+        try:
+            yield spool
+        except BaseException:
+            if not was_spool:
+                spool.remove()
+            raise
+
+
+@contextmanager
+def _there_again(path: Path) -> Iterator[None]:
+    """Make a folder again after an error that was there before."""
+    path = path.expanduser()
+    was_there = path.is_dir()
+    try:
+        yield
     except BaseException:
         if was_there:
             with suppress(OSError):
-                spool.path.mkdir(exist_ok=True)
+                path.mkdir(exist_ok=True)
         raise
 
 

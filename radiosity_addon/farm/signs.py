@@ -38,17 +38,24 @@ def is_alive(number: int) -> bool:
     return True
 
 
-def refuse_second_bake(sign: Path) -> None:
-    """Raise BakeError if another process bakes through the spool of this sign."""
+def other_baker(sign: Path) -> tuple[str, str] | None:
+    """Return the machine and the number of another process that bakes through the spool of this sign."""
     try:
         host, number = sign.read_text().split()
         if [host, number] == this_process().split():
-            return
+            return None
         silence = time.time() - sign.stat().st_mtime
         alive = is_alive(int(number)) if host == socket.gethostname() else silence < SILENCE
     except (OSError, ValueError, OverflowError):
-        return
-    if alive:
+        return None
+    return (host, number) if alive else None
+
+
+def refuse_second_bake(sign: Path) -> None:
+    """Raise BakeError if another process bakes through the spool of this sign."""
+    other = other_baker(sign)
+    if other is not None:
+        host, number = other
         raise BakeError(
             f"spool '{sign.parent}' is used by process {number} on {host}: give each bake its own "
             f"(if that is no bake, remove '{sign}')"

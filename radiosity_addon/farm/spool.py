@@ -9,6 +9,9 @@
     open                     the digest of the call that waits for its tasks
     baking                   which process bakes
     over                     the bake has ended
+    prepared                 the digest of the bake that was prepared (`prepared.py`), as an object
+    results/DIGEST           the digest of what a bake of these inputs found (`stored_result.py`)
+    finished                 the folder that the prepared bake was finished into
 
 Everything is written aside and renamed, and checked by its digest when it is read: what is not whole is
 found, and made again, so nothing has to be synced. Running a task twice does no harm, so nothing is locked.
@@ -19,60 +22,60 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from ..base import BakeError
 from ..numerics import ArrayFileError, read_arrays, write_arrays
 from .identity import identity
-from .objects import KINDS, ObjectError, array_digest, digest_of
-from .recent import Recent
+from .objects import ObjectError, digest_of
 from .signs import refuse_second_bake, take_away, this_process
-
-Array = npt.NDArray[Any]
+from .spool_store import Array, SpoolStore, explained, not_written
 
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
 
-_DIGEST = re.compile(r"[0-9a-f]{40}")
-_FOLDERS = ("arrays", "objects", "calls", "aside")
+RECORD, PREPARED, FINISHED = "spool.json", "prepared", "finished"
+
+_FOLDERS = ("arrays", "objects", "calls", "results", "aside")
 _OURS = re.compile(
     r"(arrays/[0-9a-f]{40}\.npy|objects/[0-9a-f]{40}\.json|calls/[0-9a-f]{40}/(call\.json|\d+\.(claim|result))"
-    r"|aside/[0-9a-f]{32}|\.[0-9a-f]{32})"
+    r"|results/[0-9a-f]{40}|aside/[0-9a-f]{32}|\.[0-9a-f]{32})"
 )
 
 
-class Spool:
-    """A spool that exists, or is made.
-
-    path: Its folder.
-    input_bytes: Of objects, arrays and calls that were written through it.
-    """
+class Spool(SpoolStore):
+    """A spool that exists, or is made."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path.expanduser().resolve()
+        super().__init__(path)
         self.sign = self.path / "baking"
-        self.input_bytes = 0
-        self._arrays: Recent[Array] = Recent()
 
     @classmethod
     def to_bake(cls, path: Path, made_for: Path | None = None) -> Spool:
-        """Return a spool to bake with: a new one in an empty folder, or one of this program.
+        """Return a spool that this process bakes with, made if it is not there.
 
         made_for: The output folder of the bake that makes the spool for itself.
+        Raises BakeError as `made` does.
+        """
+        spool = cls.made(path, made_for)
+        spool.reopen()
+        spool.take()
+        return spool
+
+    @classmethod
+    def made(cls, path: Path, made_for: Path | None = None) -> Spool:
+        """Return a new spool in an empty folder, or one of this program that no bake goes on in.
+
         Raises BakeError if the folder holds other things, another bake uses it, or it cannot be written to.
         """
         spool = cls(path)
-        with _explained(spool.path):
+        with explained(spool.path):
             if spool.path.exists() and not spool.path.is_dir():
                 raise BakeError(f"'{spool.path}' is no folder: give an empty folder")
             spool.path.mkdir(parents=True, exist_ok=True)
-            record = spool.path / "spool.json"
+            record = spool.path / RECORD
             if not record.exists():
                 # A bake that was killed at its start may have left what it was writing.
                 if not all(_OURS.fullmatch(path.name) for path in spool.path.iterdir()):
@@ -83,10 +86,16 @@ class Spool:
             refuse_second_bake(spool.sign)
             for name in _FOLDERS:
                 (spool.path / name).mkdir(exist_ok=True)
-            with contextlib.suppress(FileNotFoundError):
-                (spool.path / "over").unlink()
-            spool._write(spool.sign, this_process().encode())
         return spool
+
+    def take(self) -> None:
+        """Show that this process works at the bake: others are refused until it leaves."""
+        self._write(self.sign, this_process().encode())
+
+    def reopen(self) -> None:
+        """Have workers wait for the bake again, which has ended."""
+        with explained(self.path), contextlib.suppress(FileNotFoundError):
+            (self.path / "over").unlink()
 
     @classmethod
     def of_output(cls, path: Path, output: Path) -> Spool:
@@ -94,7 +103,7 @@ class Spool:
 
         Raises BakeError if something else has its name, or as `to_bake` does.
         """
-        with _explained(path):
+        with explained(path):
             if path.is_symlink() or (path.exists() and not cls(path)._is_free_for(output)):
                 raise BakeError(
                     f"'{path}' is in the way of the bake's spool: rename it, or give a folder with --spool"
@@ -109,7 +118,7 @@ class Spool:
         record = self._record()
         if record is None:
             return self.path.is_dir() and all(_OURS.fullmatch(path.name) for path in self.path.iterdir())
-        if not self.is_made_for(output):
+        if not self.is_made_for(output) or (self.path / PREPARED).exists():
             return False
         refuse_second_bake(self.sign)
         if record.get("program") != identity():
@@ -123,7 +132,7 @@ class Spool:
 
     def last_sign(self) -> float:
         """Return when a bake was last known to go on here [s since 1970]. Raises OSError if none ever was."""
-        sign = self.sign if self.sign.exists() else self.path / "spool.json"
+        sign = self.sign if self.sign.exists() else self.path / RECORD
         return sign.stat().st_mtime
 
     @classmethod
@@ -135,7 +144,7 @@ class Spool:
 
     def check(self) -> None:
         """Refuse what is no spool, or one of another program: its bytes would differ."""
-        path, record = self.path / "spool.json", self._record()
+        path, record = self.path / RECORD, self._record()
         if record is None:
             if path.exists():
                 raise BakeError(f"'{path}' is damaged: give the bake an empty folder")
@@ -157,57 +166,10 @@ class Spool:
     def _record(self) -> dict[str, Any] | None:
         """Return what a spool says of itself; None if that is not there or damaged."""
         try:
-            record = json.loads((self.path / "spool.json").read_bytes())
+            record = json.loads((self.path / RECORD).read_bytes())
         except (OSError, ValueError, RecursionError):
             return None
         return record if isinstance(record, dict) and record.get("kind") == KIND else None
-
-    # Objects and arrays
-
-    def put_object(self, digest: str, text: str) -> None:
-        """See `Store`."""
-        self._keep(self._at("objects", digest, ".json"), text.encode())
-
-    def object(self, digest: str) -> str:
-        """See `Store`."""
-        text = self._read(self._at("objects", digest, ".json")).decode(errors="replace")
-        if digest_of(text) != digest:
-            raise ObjectError(f"object {digest} is damaged")
-        return text
-
-    def put_array(self, array: Array) -> str:
-        """See `Store`."""
-        array = np.ascontiguousarray(array)
-        digest = array_digest(array)
-        path = self._at("arrays", digest, ".npy")
-        if not path.exists() or not self._is_whole(digest):
-            with self._replacing(path) as aside, aside.open("wb") as file:
-                np.save(file, array, allow_pickle=False)
-            self.input_bytes += array.nbytes
-        return digest
-
-    def _is_whole(self, digest: str) -> bool:
-        try:
-            self._read_array(digest)
-        except ObjectError:
-            return False
-        return True
-
-    def array(self, digest: str) -> Array:
-        """See `Store`; it stays in its file, and is checked when it is first read."""
-        known = self._arrays.get(digest)
-        return self._arrays.put(digest, self._read_array(digest)) if known is None else known
-
-    def _read_array(self, digest: str) -> Array:
-        path = self._at("arrays", digest, ".npy")
-        try:
-            found = np.load(path, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise ObjectError(f"array {digest}: {error}") from error
-        array = np.asarray(found)
-        if array.dtype.kind not in KINDS or array_digest(array) != digest:
-            raise ObjectError(f"array {digest} is damaged")
-        return array
 
     # Calls and tasks
 
@@ -215,7 +177,7 @@ class Spool:
         """Write a call, and show it as the one that waits; return its digest."""
         digest = digest_of(text)
         folder = self._at("calls", digest)
-        with _explained(self.path):
+        with explained(self.path):
             if folder.is_symlink():
                 folder.unlink()
             folder.mkdir(exist_ok=True)
@@ -224,15 +186,12 @@ class Spool:
             for claim in folder.glob("*.claim"):
                 with contextlib.suppress(OSError):
                     claim.unlink()
-        self._write(self.path / "open", digest.encode())
+        self.point("open", digest)
         return digest
 
     def open_call(self) -> str | None:
         """Return the digest of the call that waits for its tasks, if there is one."""
-        with contextlib.suppress(OSError, ValueError):
-            digest = (self.path / "open").read_bytes()[:64].decode().strip()
-            return digest if _DIGEST.fullmatch(digest) else None
-        return None
+        return self.pointer("open")
 
     def call(self, digest: str) -> Any:
         """Return a call. Raises ObjectError if it is damaged, or a link out of the spool."""
@@ -258,7 +217,7 @@ class Spool:
         except FileExistsError:
             return False
         except OSError as error:
-            raise _full(self.path, error) from error
+            raise not_written(self.path, error) from error
         return True
 
     def done(self, digest: str) -> set[int]:
@@ -309,9 +268,17 @@ class Spool:
             return (self._at("calls", digest) / f"{task}.result").stat().st_size
         return 0
 
+    def note(self, name: str, text: str) -> None:
+        """Write a short text for other processes."""
+        self._write(self.path / name, text.encode())
+
     def end(self) -> None:
         """Tell all workers that the bake has ended, and remove what it left."""
         self.say_over()
+        self._empty()
+
+    def _empty(self) -> None:
+        """Remove what bakes left."""
         self.leave()
         left = [path for path in self.path.glob(".*") if path.is_file()]
         for folder in (self.path / name for name in _FOLDERS):
@@ -328,8 +295,10 @@ class Spool:
     def remove(self) -> None:
         """Remove the spool with all that we wrote; the folder stays if it holds anything else."""
         with contextlib.suppress(OSError, BakeError):
-            self.end()
-        for name in ("open", "baking", "over", "spool.json"):
+            self.say_over()  # as long as the disk is not full
+        with contextlib.suppress(OSError):
+            self._empty()
+        for name in ("open", "baking", "over", PREPARED, FINISHED, RECORD):
             with contextlib.suppress(OSError):
                 (self.path / name).unlink()
         with contextlib.suppress(OSError):
@@ -341,58 +310,4 @@ class Spool:
 
     def is_over(self) -> bool:
         """Return whether the bake has ended."""
-        return (self.path / "over").exists() or not (self.path / "spool.json").exists()
-
-    # Files
-
-    def _at(self, folder: str, digest: str, suffix: str = "") -> Path:
-        if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
-            raise ObjectError("a name that is no digest")
-        return self.path / folder / f"{digest}{suffix}"
-
-    def _read(self, path: Path) -> bytes:
-        try:
-            return path.read_bytes()
-        except OSError as error:
-            raise ObjectError(f"'{path}' cannot be read: {error.strerror}") from error
-
-    def _keep(self, path: Path, content: bytes) -> None:
-        """Write a file, if it is not there or damaged."""
-        with contextlib.suppress(OSError):
-            if path.read_bytes() == content:
-                return
-        self._write(path, content)
-        self.input_bytes += len(content)
-
-    def _write(self, path: Path, content: bytes) -> None:
-        with self._replacing(path) as aside:
-            aside.write_bytes(content)
-
-    @contextlib.contextmanager
-    def _replacing(self, path: Path) -> Iterator[Path]:
-        """Yield where to write a file that is then put in its place, or removed if it cannot be written."""
-        name = uuid.uuid4().hex
-        aside = path.with_name(f".{name}") if path.parent == self.path else self.path / "aside" / name
-        with _explained(self.path):
-            try:
-                yield aside
-                aside.replace(path)
-            except BaseException:
-                with contextlib.suppress(OSError):
-                    aside.unlink()
-                raise
-
-
-@contextlib.contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise _full(path, error) from error
-
-
-def _full(path: Path, error: OSError) -> BakeError:
-    why = error.strerror or "its disk may be full"  # NumPy tells no more
-    return BakeError(
-        f"cannot write to spool '{path}': {why}; see to it and start again"
-    )
+        return (self.path / "over").exists() or not (self.path / RECORD).exists()

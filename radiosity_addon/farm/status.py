@@ -5,12 +5,33 @@ from __future__ import annotations
 from contextlib import suppress
 
 from .objects import ObjectError
+from .prepared import PreparedBake
 from .spool import Spool
+from .stages import Stage, finished_into, stage_of
 from .tasks import task_count
 
 
 def status_lines(spool: Spool) -> list[str]:
-    """Return what there is to say of a spool, a line each."""
+    """Return what there is to say of a spool, a line each.
+
+    Raises BakeError if a bake that was prepared there is damaged.
+    """
+    stage = stage_of(spool)
+    if stage is None:
+        return _of_bake(spool)
+    return [*_of_stage(spool, stage), *(_of_bake(spool) if stage in ("running", "interrupted") else ())]
+
+
+def _of_stage(spool: Spool, stage: Stage) -> list[str]:
+    prepared = PreparedBake.read(spool)
+    into = finished_into(spool)
+    if into is not None:
+        return [f"{stage}, into '{into}'"]
+    assert prepared is not None
+    return [f"{stage}: scene '{prepared.scene}' of '{prepared.source}'"]
+
+
+def _of_bake(spool: Spool) -> list[str]:
     if spool.is_over():
         return ["the bake has ended"]
     digest = spool.open_call()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..rays import counted_apart
 from .objects import ObjectError, Reader, Writer, digest_of, name_of
 from .recent import Recent
 from .signs import this_process
@@ -98,21 +99,27 @@ def task_count(slices: int) -> int:
     return -(-slices // slices_of_task(slices))
 
 
-def run_task(spool: Spool, digest: str, task: int, work: partial[Any], bounds: list[list[int]]) -> list[Any]:
-    """Run a kernel for the slices of a task, write what they found, and return it."""
+def run_task(
+    spool: Spool, digest: str, task: int, work: partial[Any], bounds: list[list[int]]
+) -> tuple[list[Any], dict[str, int]]:
+    """Run a kernel for the slices of a task, write what they found, and return it.
+
+    Returns also the rays that it took, by the names of their counts.
+    """
     step, started = slices_of_task(len(bounds)), time.thread_time()
-    found = [work(slice(*pair)) for pair in bounds[task * step : (task + 1) * step]]
+    with counted_apart() as rays:
+        found = [work(slice(*pair)) for pair in bounds[task * step : (task + 1) * step]]
     store = _ResultStore()
     tree = Writer(store).tree(found)
     # Of truth values and numbers; a scalar's array has no axis.
     arrays = [np.ascontiguousarray(array) for array in store.arrays]
-    done = {"seconds": time.thread_time() - started, "by": this_process()}
+    done = {"seconds": time.thread_time() - started, "by": this_process(), "rays": rays}
     spool.put_result(digest, task, {"found": tree, "objects": store.objects, **done}, arrays)
-    return found
+    return found, rays
 
 
-def values_of(description: Any, arrays: list[Any]) -> tuple[list[Any], float, str]:
-    """Return what the slices of a task found, its processor seconds, and by which process.
+def values_of(description: Any, arrays: list[Any]) -> tuple[list[Any], float, str, dict[str, int]]:
+    """Return what the slices of a task found, its processor seconds, by which process, and its rays.
 
     Raises ObjectError if it is not as `run_task` wrote it.
     """
@@ -120,8 +127,9 @@ def values_of(description: Any, arrays: list[Any]) -> tuple[list[Any], float, st
         store = _ResultStore(description["objects"], arrays)
         found = Reader(store).value(description["found"])
         seconds, by = float(description["seconds"]), str(description["by"])
-    except (KeyError, TypeError, ValueError) as error:
+        rays = {str(name): int(count) for name, count in description["rays"].items()}
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise ObjectError(str(error)) from error
     if not isinstance(found, list) or not 0 <= seconds < math.inf:
         raise ObjectError("no list of results")
-    return found, seconds, by
+    return found, seconds, by, rays

@@ -9,21 +9,30 @@ from pathlib import Path
 from typing import Any
 
 from ..base import BakeError
+from ..cli import quoted
 from .objects import ObjectError
 from .recent import Recent
 from .signs import BakeWatch
-from .spool import Spool
+from .spool import RECORD, Spool
 from .tasks import read_kernel, run_task, task_count
 
 SHORTEST, LONGEST = 0.01, 0.1
 """Seconds between looks for work: longer the longer there is none."""
 
 
-def wait_for(path: Path, seconds: float) -> None:
-    """Wait until a spool is there, for a number of seconds at most."""
+def wait_for(path: Path, seconds: float) -> Spool:
+    """Return a spool once a bake has begun in it, or after a number of seconds at most.
+
+    Raises BakeError if there is none by then, or it is of another program.
+    """
     end = time.monotonic() + seconds
-    while not (path.expanduser() / "spool.json").exists() and time.monotonic() < end:
+    while not (path.expanduser() / RECORD).exists() and time.monotonic() < end:
         time.sleep(LONGEST)
+    spool = Spool.to_work(path)
+    # One that was prepared waits to be run.
+    while not (spool.sign.exists() or spool.is_over()) and time.monotonic() < end:
+        time.sleep(LONGEST)
+    return spool
 
 
 def work(
@@ -70,6 +79,38 @@ def work(
             raise
         count, pause, since = count + 1, SHORTEST, time.monotonic()
     return count
+
+
+def open_tasks(spool: Spool) -> list[str]:
+    """Return the names of the tasks of the open call that nobody has begun: its digest and their numbers."""
+    digest = spool.open_call()
+    if digest is None:
+        return []
+    try:
+        count = task_count(len(spool.call(digest)["slices"]))
+    except (ObjectError, KeyError, TypeError):
+        return []
+    begun = spool.claimed(digest) | spool.done(digest)
+    return [f"{digest}-{task}" for task in range(count) if task not in begun]
+
+
+def do_task(spool: Spool, name: str) -> None:
+    """Do one task of the open call, also if somebody has begun it: who has may be gone.
+
+    Raises BakeError if there is no such task, it is done, or the spool cannot be written to.
+    """
+    digest, _, number = name.partition("-")
+    if number.isascii() and number.isdecimal() and len(number) < 9 and digest == spool.open_call():
+        task = int(number)
+        try:
+            kernel, bounds = read_kernel(spool, digest, Recent())
+        except ObjectError as error:
+            raise BakeError(f"task {name} cannot be done: {error}") from error
+        if task < task_count(len(bounds)) and task not in spool.done(digest):
+            spool.claim(digest, task)
+            run_task(spool, digest, task, kernel, bounds)
+            return
+    raise BakeError(f"'{spool.path}' has no open task {quoted(name)}: see `status --tasks`")
 
 
 def _free_task(spool: Spool, digest: str, count: int) -> int | None:

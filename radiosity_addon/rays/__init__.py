@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .caster import NO_HIT, SAGITTA, SIGHT_LIFT, Hits, RayCaster, free_segment, passing_light, surface_offset
 from .embree import TARGET_SLACK, EmbreeCaster, embree_work
+from .ray_count import RayCount, counted_apart
 
 __all__ = [
     "NO_HIT",
@@ -16,6 +17,8 @@ __all__ = [
     "EmbreeCaster",
     "Hits",
     "RayCaster",
+    "RayCount",
+    "counted_apart",
     "embree_work",
     "free_segment",
     "passing_light",

@@ -17,6 +17,7 @@ import numpy as np
 from ..numerics import Array, double_area_vectors, fill_chunks
 from .caster import NO_HIT, Hits, RayCaster, surface_offset
 from .coplanar import facing_copies
+from .ray_count import RayCount
 
 CHUNK = 1 << 16
 """Rays a call: large enough to hide the call's 2 µs, small enough for cache and threads."""
@@ -69,10 +70,9 @@ class EmbreeCaster:
         for_lamps: RayCaster | None = None,
         two_sided: Array | None = None,
     ) -> None:
-        self._own_rays = 0
+        self.own_rays = RayCount()
         self.tinted = False
         self._for_lamps = for_lamps
-        self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
         self._threads = threads
         self._rows = None if only is None or only.all() else np.flatnonzero(only)
@@ -106,12 +106,12 @@ class EmbreeCaster:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what another process needs to make the same caster."""
-        without = ("_scene", "_mesh", "_counting", "_own_rays")
+        without = ("_scene", "_mesh", "own_rays")
         return {name: value for name, value in vars(self).items() if name not in without}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._counting, self._own_rays = Lock(), 0
+        self.own_rays = RayCount()
         if not self._empty:
             self._build()
 
@@ -123,7 +123,7 @@ class EmbreeCaster:
     @property
     def rays(self) -> int:
         """Rays traced so far, those to lamps among them."""
-        return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
+        return self.own_rays.rays + (0 if self._for_lamps is None else self._for_lamps.rays)
 
     def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
@@ -131,8 +131,7 @@ class EmbreeCaster:
         free = np.ones(count, dtype=bool)
         if self._empty or count == 0:
             return free
-        with self._counting:
-            self._own_rays += count
+        self.own_rays.add(count)
         trace = partial(_unoccluded, self._scene, self._center, origins, directions, distances)
         fill_chunks(trace, free, count, CHUNK, self._threads)
         return free
@@ -156,8 +155,7 @@ class EmbreeCaster:
         distance = np.full(count, np.inf, dtype=np.float32)
         if self._empty or count == 0:
             return Hits(triangle, barycentric, front, distance)
-        with self._counting:
-            self._own_rays += count
+        self.own_rays.add(count)
         trace = partial(
             _first_hits, self._scene, self._center, self._rows, self._normals, origins, directions
         )

@@ -14,13 +14,12 @@ glass that sends no light of its own there is nothing to hit, and the tint is al
 
 from __future__ import annotations
 
-from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from ..numerics import Array, hash_keys
-from ..rays import NO_HIT, TARGET_SLACK, EmbreeCaster, Hits, RayCaster, surface_offset
+from ..rays import NO_HIT, TARGET_SLACK, EmbreeCaster, Hits, RayCaster, RayCount, surface_offset
 from .layers import Layers
 from .scene import Scene
 from .stacks import Stacks
@@ -117,9 +116,8 @@ class CutOutCaster:
         two_sided: Array | None = None,
         stacks: Stacks | None = None,
     ) -> None:
-        self._own_rays = 0
+        self.own_rays = RayCount()
         self._for_lamps = for_lamps
-        self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
         self._images, self._stacks = images, stacks
         met = np.ones(len(triangles), dtype=bool) if only is None else only
@@ -133,11 +131,11 @@ class CutOutCaster:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what another process needs to make the same caster."""
-        return {name: value for name, value in vars(self).items() if name not in ("_counting", "_own_rays")}
+        return {name: value for name, value in vars(self).items() if name != "own_rays"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._counting, self._own_rays = Lock(), 0
+        self.own_rays = RayCount()
 
     @property
     def for_lamps(self) -> RayCaster:
@@ -147,11 +145,11 @@ class CutOutCaster:
     @property
     def rays(self) -> int:
         """Number of rays so far, including those to lamps, each counted once despite cut-outs."""
-        return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
+        return self.own_rays.rays + (0 if self._for_lamps is None else self._for_lamps.rays)
 
     def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: no opaque point lies within `distances` along the unit `directions`."""
-        self._count(len(origins))
+        self.own_rays.add(len(origins))
         free = self._whole.unoccluded(origins, directions, distances)
         rows = np.flatnonzero(free)
         reach = distances[rows] * (1.0 - TARGET_SLACK)
@@ -162,7 +160,7 @@ class CutOutCaster:
         """Return (n,) float64 what share of light passes: no chance here, but 1 − opacity of all it meets."""
         if self.tinted:
             return np.asarray(self.passing_colors(origins, directions, distances, least).mean(axis=1))
-        self._count(len(origins))
+        self.own_rays.add(len(origins))
         share = self._whole.unoccluded(origins, directions, distances).astype(np.float64)
         free = np.flatnonzero(share)
         ways = self._ways(free, origins, directions, distances * (1.0 - TARGET_SLACK))
@@ -178,7 +176,7 @@ class CutOutCaster:
         self, origins: Array, directions: Array, distances: Array, least: float = 0.0
     ) -> Array:
         """Return (n, 3) float64 the same of each channel."""
-        self._count(len(origins))
+        self.own_rays.add(len(origins))
         free = self._whole.unoccluded(origins, directions, distances)
         share = np.repeat(free.astype(np.float64)[:, None], 3, axis=1)
         ways = self._ways(np.flatnonzero(free), origins, directions, distances * (1.0 - TARGET_SLACK))
@@ -192,7 +190,7 @@ class CutOutCaster:
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
         """Return the first opaque point that each ray meets."""
-        self._count(len(origins))
+        self.own_rays.add(len(origins))
         hits = self._whole.intersect(origins, directions)
         nearer = self._first_there(origins, directions, hits.distance)
         is_cut = nearer.triangle != NO_HIT
@@ -265,10 +263,6 @@ class CutOutCaster:
     def _ways(self, ray: Array, origins: Array, directions: Array, reach: Array) -> _Ways:
         offset, stacks = self.surface_offset, self._stacks
         return _Ways(self._cut, self._cut_rows, offset, stacks, ray, origins, directions, reach)
-
-    def _count(self, rays: int) -> None:
-        with self._counting:
-            self._own_rays += rays
 
 
 class _Ways:

@@ -329,6 +329,20 @@ def test_blender_itself_runs_workers(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert capsys.readouterr().out == "the bake has ended\n"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no such shell here")
+def test_a_list_of_tasks_may_be_cut_short(tmp_path: Path) -> None:
+    spool = Spool.to_bake(tmp_path)
+    slices = [[number, number + 1] for number in range(200)]
+    spool.put_call(f'{{"kernel": null, "slices": {slices}}}')
+    status = f"'{sys.executable}' -m radiosity_addon.farm status --tasks '{tmp_path}'"
+    line = f"{status} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    ran = subprocess.run(
+        ["bash", "-c", line], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.endswith("-0\n")
+
+
 def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
     spool = Spool.to_bake(tmp_path)
 

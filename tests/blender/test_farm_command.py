@@ -174,11 +174,11 @@ def test_canceling_ends_the_command(
         return digest
 
     monkeypatch.setattr(Spool, "put_call", put)
-    command, sharing = farm_of(bpy.context)
+    command, baking = farm_of(bpy.context)
     assert command is not None
     settings = BakeSettings(resolution=256, quality="sketch")
     job = ended_with(
-        run_bake(bpy.context, settings, None, in_background=True, sharing=sharing), command
+        run_bake(bpy.context, settings, None, in_background=True, baking=baking), command
     )
     while not (waits[0] and preferred.note.exists()):
         next(job)

@@ -9,8 +9,8 @@ from collections.abc import Generator
 
 import pytest
 
+from radiosity_addon.base.background import SWITCH_INTERVAL, in_thread
 from radiosity_addon.base.progress import Progress
-from radiosity_addon.blender.session.background import SWITCH_INTERVAL, in_thread
 
 
 def finish(steps: Generator) -> tuple[list[float], object]:

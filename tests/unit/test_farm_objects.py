@@ -18,7 +18,7 @@ from radiosity_addon.farm.spool import Spool
 from radiosity_addon.farm.tasks import KERNELS, is_kernel
 from radiosity_addon.lights import PointLight
 from radiosity_addon.numerics import Scratch, points_at, thread_count
-from radiosity_addon.rays import Hits
+from radiosity_addon.rays import Hits, counted_apart
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene import Scene
 from tests.rooms import colored_room
@@ -96,6 +96,25 @@ def test_a_caster_that_was_stored_meets_the_same(spool: Spool) -> None:
     np.testing.assert_array_equal(one.triangle, two.triangle)
     np.testing.assert_array_equal(one.distance, two.distance)
     assert other.rays == 500
+
+
+def test_rays_of_a_copy_can_be_counted_where_the_caster_is(spool: Spool) -> None:
+    scene = colored_room()
+    caster = EmbreeCaster(scene.triangles)
+    writer = Writer(spool)
+    copy = Reader(Spool.to_work(spool.path)).value(writer.tree(caster))
+    middle, up = np.full((7, 3), 0.5), np.tile((0.0, 0.0, 1.0), (7, 1))
+    caster.intersect(middle, up)
+    with counted_apart() as rays:
+        copy.intersect(middle, up)
+        copy.unoccluded(middle[:2], up[:2], np.ones(2))
+    assert (copy.rays, caster.rays) == (0, 7)
+    ((name, count),) = rays.items()
+    assert count == 9
+    writer.ray_counts[name].add(count)
+    assert caster.rays == 16
+    copy.intersect(middle, up)
+    assert copy.rays == 7
 
 
 def test_what_belongs_to_a_process_is_made_anew(spool: Spool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -21,6 +22,8 @@ SETTING = {
     *("evalInfo", "visible", "required", "editable"),
 }
 """What Flamenco's `AvailableJobSetting` has."""
+
+STAGES = ("prepare", "run", "finish")
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no Node.js here")
 
@@ -53,43 +56,66 @@ def test_its_settings_are_flamencos() -> None:
         assert setting["visible"] in ("visible", "hidden", "submission", "web")
 
 
-def test_the_bake_comes_first_and_helpers_run_meanwhile() -> None:
-    job = compiled(helpers=3)
-    bake, *helpers = job["tasks"]
-    assert [task["name"] for task in job["tasks"]] == ["bake", "help-1", "help-2", "help-3"]
-    assert {task["type"] for task in job["tasks"]} == {"blender"}
-    assert all(task["priority"] < bake["priority"] for task in helpers)
-    assert not any(task["dependencies"] for task in job["tasks"])
+def test_stages_follow_each_other_and_helpers_work_while_the_bake_runs() -> None:
+    tasks = {task["name"]: task for task in compiled(helpers=3)["tasks"]}
+    helpers = [f"help-{number}" for number in (1, 2, 3)]
+    assert list(tasks) == ["prepare", "run", *helpers, "finish"]
+    assert {task["type"] for task in tasks.values()} == {"blender"}
+    after = {name: task["dependencies"] for name, task in tasks.items()}
+    assert after == {
+        "prepare": [],
+        "run": ["prepare"],
+        **{name: ["prepare"] for name in helpers},
+        "finish": ["run"],
+    }
+    # One machine alone gets from stage to stage, and to the helpers last.
+    assert all(tasks[name]["priority"] < tasks[stage]["priority"] for name in helpers for stage in STAGES)
 
 
 @pytest.mark.parametrize("output", ["/farm/out", "/farm/out/", "R:\\farm\\out\\"])
 def test_all_share_one_spool_next_to_the_output(output: str) -> None:
     job = compiled(output=output, options='--quality high --objects "Big Floor" Wall', processes=5)
-    spool = f"{output.rstrip('/' + chr(92))}-spool-T0"
+    folder = output.rstrip("/" + chr(92))
+    spool = f"{folder}-spool-T0"
     assert job["settings"]["spool"] == spool
-    bake, *helpers = (task["commands"] for task in job["tasks"])
-    ((command),) = bake
-    assert command["name"] == "blender-render"
-    said = command["parameters"]
-    assert (said["exe"], said["exeArgs"]) == ("{blender}", "{blenderArgs}")
-    assert said["blendfile"] == "/farm/a b.blend"
-    assert said["argsBefore"] == ["--background"]
-    assert said["args"][:2] == ["--command", "radiosity"]
+    commands_of = {task["name"]: task["commands"] for task in job["tasks"]}
     # Our own command lines understand what is said.
-    request = build_parser("blender").parse_args(said["args"][2:])
-    assert (request.verb, str(request.spool), request.quality) == ("bake", spool, "high")
-    assert str(request.output) == output.rstrip("/" + chr(92))
-    assert request.objects == ["Big Floor", "Wall"]
-    for (command,) in helpers:
+    with_scene = {}
+    for stage in ("prepare", "finish"):
+        (command,) = commands_of.pop(stage)
+        assert command["name"] == "blender-render"
+        said = command["parameters"]
+        assert (said["exe"], said["exeArgs"]) == ("{blender}", "{blenderArgs}")
+        assert said["blendfile"] == "/farm/a b.blend"
+        assert said["argsBefore"] == ["--background"]
+        assert said["args"][:2] == ["--command", "radiosity"]
+        with_scene[stage] = build_parser("blender").parse_args(said["args"][2:])
+        assert (with_scene[stage].verb, str(with_scene[stage].spool)) == (stage, spool)
+    assert with_scene["prepare"].quality == "high"
+    assert with_scene["prepare"].objects == ["Big Floor", "Wall"]
+    assert str(with_scene["finish"].output) == folder
+    for name, (command,) in commands_of.items():
         assert (command["name"], command["parameters"]["exe"]) == ("exec", "{blender}")
         words = command["parameters"]["args"]
         assert words[:3] == ["--background", "--command", "radiosity"]
         request = commands.build_parser("blender").parse_args(words[3:])
-        assert (request.verb, str(request.spool), request.processes) == ("worker", spool, 5)
-        assert request.wait == 3600
+        assert words[3] in host_commands()
+        assert str(request.spool) == spool
+        if name == "run":
+            assert request.verb == "run"
+        else:
+            assert (request.verb, request.processes, request.wait) == ("worker", 5, 3600)
+
+
+def host_commands() -> tuple[str, ...]:
+    """Return the commands that Blender passes on to those of spools."""
+    source = (ROOT / "radiosity_addon" / "blender" / "command_line" / "host.py").read_text()
+    found = re.search(r"OF_SPOOLS = \((.*)\)", source)
+    assert found
+    return tuple(word.strip(' "') for word in found[1].split(","))
 
 
 def test_there_may_be_few_helpers_and_no_options() -> None:
-    job = compiled(helpers=0, options=None)
-    (bake,) = job["tasks"]
-    assert bake["commands"][0]["parameters"]["args"][-2] == "--spool"
+    prepare, run, finish = compiled(helpers=0, options=None)["tasks"]
+    assert prepare["commands"][0]["parameters"]["args"][-2] == "--spool"
+    assert [task["name"] for task in (run, finish)] == ["run", "finish"]

@@ -71,7 +71,10 @@ def check_stored(stored: Any) -> None:
         If anything is not as it must be.
     """
     instance(stored["bake_id"], str)
-    _check_settings(BakeSettings(**stored["settings"]))
+    settings = BakeSettings(**stored["settings"])
+    check_settings(settings)
+    if settings.method != "hierarchical" or settings.quantity == "residual":
+        raise ValueError("a bake that is never kept")
     stored["objects"] = as_object_records(stored["objects"])
     transport = instance(stored["elements"], ElementTransport)
     lit, geometry = instance(stored["lit"], RelightableTexels), instance(stored["geometry"], TexelGeometry)
@@ -94,7 +97,7 @@ def check_stored(stored: Any) -> None:
     _check_report(stored["report"], len(geometry.index))
 
 
-def _check_settings(settings: BakeSettings) -> None:
+def check_settings(settings: BakeSettings) -> None:
     """Refuse settings of other types than these."""
     for entry in fields(BakeSettings):
         value = getattr(settings, entry.name)
@@ -105,8 +108,6 @@ def _check_settings(settings: BakeSettings) -> None:
             allowed = (int, float)
         if type(value) not in allowed:
             raise ValueError(f"setting {entry.name}")
-    if settings.method != "hierarchical" or settings.quantity == "residual":
-        raise ValueError("a bake that is never kept")
     whole(settings.threads, 0, MOST_THREADS)
 
 
@@ -122,7 +123,7 @@ def _check_named(named: Any, triangles: int) -> None:
 
 def _check_report(report: Any, pages: int) -> None:
     """Refuse a report that is more than text and numbers, or lacks what is shown of it."""
-    _plain(report, 0)
+    check_plain(report)
     solver = instance(report["solver"], dict)
     instance(solver["method"], str)
     for name in ("elements", "links", "rays"):
@@ -133,16 +134,17 @@ def _check_report(report: Any, pages: int) -> None:
         raise ValueError("atlas")
 
 
-def _plain(value: Any, depth: int) -> None:
+def check_plain(value: Any, depth: int = 0) -> None:
+    """Refuse what is more than text and numbers."""
     if depth > MOST_LEVELS:
         raise ValueError("too deep")
     if isinstance(value, dict):
         for key, item in value.items():
             instance(key, str)
-            _plain(item, depth + 1)
+            check_plain(item, depth + 1)
     elif isinstance(value, list | tuple):
         for item in value:
-            _plain(item, depth + 1)
+            check_plain(item, depth + 1)
     elif value is not None and not isinstance(value, bool | int | float | str):
         raise ValueError("neither text nor number")
 
@@ -151,7 +153,7 @@ def _check_sources(sources: LightSources, triangles: int) -> int:
     """Check the sources; return how many gains each point may have: of lights and of emissive groups."""
     lights, groups = instance(sources.lights, tuple), instance(sources.groups, list)
     for light in lights:
-        _check_light(light)
+        check_light(light)
     count = len(sources.strengths) - len(lights)
     numbers(sources.strengths, (len(lights) + count, 3), 0.0)
     integers(sources.emitter, (triangles,), NO_SOURCE, count - 1)
@@ -164,7 +166,7 @@ def _check_sources(sources: LightSources, triangles: int) -> int:
     return len(lights) + len(groups)
 
 
-def _check_light(light: Any) -> None:
+def check_light(light: Any) -> None:
     """Refuse a light that could not be made: it is made once more, with the checks that this runs."""
     instance(light, Light)
     given = {entry.name: getattr(light, entry.name) for entry in fields(light)}

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ...base import SceneError, UsageError
-from ...cli import Console, Interrupts, Permissions
+from ...cli import Console, Interrupts, Permissions, run_through
 from ...files import (
     BLEND_NAME,
     EXPORT_FOLDER,
@@ -24,8 +24,9 @@ from ...files import (
 from ...options import Form
 from ..exporting.export import run_export
 from ..files.files import open_scene
+from ..jobs.finish import WRITING_STAGES
 from .export_places import output_of_export
-from .verbs import registered, run_through
+from .verbs import registered
 
 
 def export(folder: Path, form: Form, allowed: Permissions, console: Console, interrupts: Interrupts) -> None:
@@ -50,7 +51,7 @@ def export(folder: Path, form: Form, allowed: Permissions, console: Console, int
         output = output_of_export(folder, scene.name, allowed)
         digests = lightmap_digests(report)
         job = run_export(bpy.context, form, output, digests, compare=edited)
-        made = run_through(job, console, interrupts)
+        made = run_through(job, console, interrupts, WRITING_STAGES)
         lines = [f"exported into {folder / EXPORT_FOLDER}", *(f"  {name}" for name in made.files)]
         notes = [f"{BLEND_NAME} was changed since it was baked: it is exported as it is"] if edited else []
         console.lines([*lines, *(f"note: {note}" for note in (*notes, *made.notes))])

@@ -11,8 +11,8 @@ from ..registration import also_undo
 
 COMMAND = "radiosity"
 
-HELPING = ("worker", "status")
-"""Commands of machines that help with a bake: they need no file."""
+OF_SPOOLS = ("run", "worker", "status", "task")
+"""Commands that need a spool and no file."""
 
 _handles: list[Any] = []
 
@@ -31,13 +31,12 @@ def unregister() -> None:
 
 
 def run(argv: list[str]) -> int:
-    """Run one command on the file that Blender has open, or help with a bake; return its exit code."""
-    if argv and argv[0] in HELPING:
+    """Run one command on the file that Blender has open, or on a spool; return its exit code."""
+    if argv and argv[0] in OF_SPOOLS:
         from ...farm import run_command
 
         return run_command(argv, f"blender -b --command {COMMAND}")
     from .main import main
-
 
     loaded = Path(bpy.data.filepath) if bpy.data.filepath else None
     return main(argv, prog=f"blender -b FILE --command {COMMAND}", loaded=loaded)

@@ -9,12 +9,14 @@ import argparse
 import sys
 import traceback
 from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...base import RadiosityError
 from ...cli import (
+    OUT_OF_MEMORY,
     Console,
     Interrupts,
     Permissions,
@@ -23,10 +25,17 @@ from ...cli import (
     check_keeping,
     check_plot,
     check_sharing,
-    printable,
+    fail,
     requested_settings,
+    with_notes,
 )
 from ...options import ENGINE_PADDING, BakeSettings, Form, forms_of
+
+if TYPE_CHECKING:
+    from ...farm import PreparedBake
+
+STAGED = ("bake", "prepare", "finish")
+"""Verbs whose stages say when they may be interrupted."""
 
 EXIT_DONE = 0
 EXIT_FAILED = 1
@@ -53,12 +62,14 @@ def main(
     """
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
-        settings = requested_settings(request) if request.verb == "bake" else None
+        settings = requested_settings(request) if request.verb in ("bake", "prepare") else None
         if settings is not None:
             check_sharing(request)
-        if settings is not None and not request.check:
+        is_written = request.verb == "finish" or (request.verb == "bake" and not request.check)
+        if is_written:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
+        if settings is not None and not request.check:
             check_keeping(request, settings)
         wanted = request.forms if request.verb == "export" else getattr(request, "export", None)
         form = None if wanted is None else forms_of(wanted, request.sum_groups)
@@ -71,7 +82,7 @@ def main(
         ):
             settings = replace(settings, padding=ENGINE_PADDING)
     except RadiosityError as error:
-        return _fail(str(error), error.exit_code)
+        return fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
         return int(help_was_asked.code or 0)
     with Interrupts() if interrupts is None else nullcontext(interrupts) as those:
@@ -89,82 +100,105 @@ def _run(
     try:
         from . import verbs
     except ModuleNotFoundError as error:
-        return _fail(
+        return fail(
             f"{error.name} is not installed; run this through build.py or inside Blender", EXIT_FAILED
         )
     allowed = Permissions(request.overwrite, request.allow_scripts)
     try:
         interrupts.check()
-        interrupts.deferred = request.verb == "bake" and not request.check  # its stages say when
+        interrupts.deferred = request.verb in STAGED and not getattr(request, "check", False)
         with Console(quiet=request.quiet) as console:
-            if settings is not None and request.check:
-                return verbs.check(request.scene, loaded, request.output, settings, allowed, console)
-            if settings is not None and request.relight:
-                from .relight_verb import relight
+            of_all = (allowed, console, interrupts)
+            if request.verb == "prepare" and settings is not None:
+                from .stage_verbs import prepare
 
-                relight(
-                    request.scene,
-                    loaded,
-                    request.output,
-                    settings,
-                    request.report,
-                    allowed,
-                    console,
-                    interrupts,
-                    preview=not request.no_preview,
-                    form=form,
-                )
+                prepare(request.scene, loaded, request.spool, settings, _prepared(request, settings), *of_all)
+            elif request.verb == "finish":
+                from .stage_verbs import finish
+
+                places = (request.output, request.spool, request.report, request.plot)
+                finish(request.scene, loaded, *places, *of_all, after=after_bake)
+            elif settings is not None and request.check:
+                return verbs.check(request.scene, loaded, request.output, settings, allowed, console)
             elif settings is not None:
-                verbs.bake(
-                    request.scene,
-                    loaded,
-                    request.output,
-                    settings,
-                    request.report,
-                    request.plot,
-                    request.keep,
-                    allowed,
-                    console,
-                    interrupts,
-                    preview=not request.no_preview,
-                    form=form,
-                    spool=request.spool,
-                    farm=request.farm,
-                )
+                _bake(request, settings, form, loaded, *of_all)
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
-            if form is None and settings is not None:
-                from .outdated_exports import warn_of_outdated
-
-                warn_of_outdated(request.output, console)
-            if form is not None:
+            elif form is not None:
                 from .export_verb import export
 
                 interrupts.deferred = False
-                export(
-                    request.folder if settings is None else request.output, form, allowed, console, interrupts
-                )
+                export(request.folder, form, *of_all)
     except KeyboardInterrupt as interrupt:
-        return _fail(_with_notes(INTERRUPTED, interrupt), EXIT_INTERRUPTED)
+        return fail(with_notes(INTERRUPTED, interrupt), EXIT_INTERRUPTED)
     except RadiosityError as error:
         # An importer that Ctrl-C stopped comes back with a failure of its own.
         if interrupts.requested:
-            return _fail(_with_notes(INTERRUPTED, error), EXIT_INTERRUPTED)
-        return _fail(_with_notes(str(error), error), error.exit_code)
+            return fail(with_notes(INTERRUPTED, error), EXIT_INTERRUPTED)
+        return fail(with_notes(str(error), error), error.exit_code)
     except MemoryError:
-        return _fail("out of memory; lower the resolution, the texel density or the quality", EXIT_FAILED)
+        return fail(OUT_OF_MEMORY, EXIT_FAILED)
     except Exception as error:  # noqa: BLE001 (the last resort: a code and a line, not a bare crash)
         traceback.print_exc()
-        return _fail(f"internal error, please report it: {type(error).__name__}: {error}", EXIT_FAILED)
+        return fail(f"internal error, please report it: {type(error).__name__}: {error}", EXIT_FAILED)
     return EXIT_DONE
 
 
-def _with_notes(message: str, error: BaseException) -> str:
-    """Return an error's message, and what its way up has added to it."""
-    return "; ".join((message, *getattr(error, "__notes__", ())))
+def _bake(
+    request: argparse.Namespace,
+    settings: BakeSettings,
+    form: Form | None,
+    loaded: Path | None,
+    allowed: Permissions,
+    console: Console,
+    interrupts: Interrupts,
+) -> None:
+    """Bake or relight, and export if that is wanted too."""
+    from . import verbs
+
+    scene, output, preview = request.scene, request.output, not request.no_preview
+    of_all = (allowed, console, interrupts)
+    if request.relight:
+        from .relight_verb import relight
+
+        relight(scene, loaded, output, settings, request.report, *of_all, preview=preview, form=form)
+    else:
+        verbs.bake(
+            scene,
+            loaded,
+            output,
+            settings,
+            request.report,
+            request.plot,
+            request.keep,
+            *of_all,
+            preview=preview,
+            form=form,
+            spool=request.spool,
+            farm=request.farm,
+        )
+    after_bake(output, form, *of_all)
 
 
-def _fail(message: str, code: int) -> int:
-    with suppress(OSError, ValueError):  # nobody may read it: the exit code still says it
-        print(f"error: {printable(message)}", file=sys.stderr, flush=True)  # noqa: T201
-    return code
+def after_bake(
+    output: Path, form: Form | None, allowed: Permissions, console: Console, interrupts: Interrupts
+) -> None:
+    """Export a bake that has just been published, or warn of an export that is older."""
+    if form is None:
+        from .outdated_exports import warn_of_outdated
+
+        warn_of_outdated(output, console)
+        return
+    from .export_verb import export
+
+    interrupts.deferred = False
+    export(output, form, allowed, console, interrupts)
+
+
+def _prepared(request: argparse.Namespace, settings: BakeSettings) -> PreparedBake:
+    """Return what is to become of a bake that is prepared."""
+    from ...farm import PreparedBake
+
+    return PreparedBake(
+        "", settings, request.keep, not request.no_preview, request.export, request.sum_groups
+    )

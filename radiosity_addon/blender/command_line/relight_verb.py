@@ -14,7 +14,7 @@ from ...bake.relight import noise_warnings, strengths_in
 from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeError, BakeWarning, Status, UsageError, staged
-from ...cli import Console, Interrupts, Permissions, summary
+from ...cli import Console, Interrupts, Permissions, run_through, summary
 from ...files import (
     BLEND_NAME,
     OWNER,
@@ -29,12 +29,12 @@ from ..apply.rebake import Originals
 from ..files.output import OutputFolder
 from ..files.single_files import check_places
 from ..images.images import group_file_names, page_file_names
-from ..jobs.finish import Copies, finish
+from ..jobs.finish import WRITING_STAGES, Copies, finish
 from ..jobs.preview import QUICK_SAMPLES
 from ..relight.relight_scene import lit
 from ..scene_export.export import export_steps
 from .export_places import check_export
-from .verbs import command_owner, open_or_build, output_of, registered, run_through, same_file, written_files
+from .verbs import command_owner, open_or_build, output_of, registered, same_file, written_files
 
 EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
 """How far the whole is when each part begins; rough."""
@@ -92,7 +92,7 @@ def relight(
         if form is not None:
             check_export(output, form, stored.settings.quantity, allowed)
         job = relight_into(bpy.context, stored, folder, notes, preview)
-        report = run_through(job, console, interrupts)
+        report = run_through(job, console, interrupts, WRITING_STAGES)
         if report_copy is not None:
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import bpy
 
-from ...bake import KeepOptions
+from ...bake import Baking, KeepOptions
 from ...bake.result import write_history
-from ...base import BakeWarning, SceneError, Status, UsageError
-from ...cli import Console, FarmSpec, Interrupts, Permissions, summary
-from ...farm import DaskWorkers, Helpers, LocalWorkers, given_spool, own_spool, shared_bake
+from ...base import BakeWarning, SceneError, UsageError
+from ...cli import Console, FarmSpec, Interrupts, Permissions, run_through, summary
+from ...farm import given_spool, own_spool, shared_bake, shared_pipeline, wanted_helpers
 from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME, Owner
 from ...options import BakeSettings, Form
 from ..apply.restore import restore_scene
@@ -32,8 +31,6 @@ from ..registration import register, unregister
 from ..relight import kept_bakes
 from ..session import last_bake
 from .export_places import check_export
-
-T = TypeVar("T")
 
 MAX_IMAGES = 8
 """The closing lines name at most this many lightmaps one by one."""
@@ -56,6 +53,50 @@ def bake(
     spool: Path | None = None,
     farm: FarmSpec | None = None,
 ) -> None:
+    """Bake as `bake_with` does, with the pipeline or what of it is shared.
+
+    Parameters
+    ----------
+    keep : bool
+        Whether a sidecar is written, by which the bake can be relit.
+    spool : Path or None
+        The folder through which workers share the bake.
+    farm : FarmSpec or None
+        Workers that are started for it.
+    """
+    bake_with(
+        scene,
+        loaded,
+        output,
+        settings,
+        report_copy,
+        plot,
+        KeepOptions(sidecar=True) if keep else None,
+        allowed,
+        console,
+        interrupts,
+        preview=preview,
+        form=form,
+        baking=_shared_with(output, spool, farm),
+    )
+
+
+def bake_with(
+    scene: Path | None,
+    loaded: Path | None,
+    output: Path,
+    settings: BakeSettings,
+    report_copy: Path | None,
+    plot: Path | None,
+    keeping: KeepOptions | None,
+    allowed: Permissions,
+    console: Console,
+    interrupts: Interrupts,
+    *,
+    preview: bool,
+    form: Form | None,
+    baking: AbstractContextManager[Baking | None],
+) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
     Parameters
@@ -71,8 +112,8 @@ def bake(
         Second copy of the report.
     plot : Path or None
         Where the history is drawn to.
-    keep : bool
-        Whether a sidecar is written, by which the bake can be relit.
+    keeping : KeepOptions or None
+        How the bake is kept, to be relit.
     allowed : Permissions
     console : Console
     interrupts : Interrupts
@@ -80,10 +121,8 @@ def bake(
         Whether a picture of the result is rendered.
     form : Form or None
         What is exported afterwards: its files are checked before the bake starts.
-    spool : Path or None
-        The folder through which workers share the bake.
-    farm : FarmSpec or None
-        Workers that are started for it.
+    baking : context manager of Baking or None
+        Entered when the bake begins: what takes the pipeline's place, see `run_bake`.
     """
     with registered(), ExitStack() as stack:
         source = scene or loaded
@@ -91,15 +130,10 @@ def bake(
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
         check_places(_places(report_copy, plot), source)
         console.progress("open", 0.0)
-        helpers = None if farm is None else stack.enter_context(_helpers(farm))
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy, plot)
         if form is not None:
             check_export(output, form, settings.quantity, allowed)
-        keeping = KeepOptions(sidecar=True) if keep else None
-        shared = None
-        if spool is not None or farm is not None:
-            shared = stack.enter_context(own_spool(output) if spool is None else given_spool(spool))
         job = run_bake(
             bpy.context,
             settings,
@@ -108,12 +142,12 @@ def bake(
             keeping=keeping,
             notes=notes,
             with_preview=preview,
-            sharing=None if shared is None else partial(shared_bake, shared, helpers),
+            baking=stack.enter_context(baking),
         )
-        report = run_through(job, console, interrupts)
+        report = run_through(job, console, interrupts, WRITING_STAGES)
         if report_copy is not None:
             report.write_copy(report_copy)
-        files = written_files(report.as_dict(), preview, keep)
+        files = written_files(report.as_dict(), preview, keeping is not None)
         if plot is not None:
             console.progress("plot", 1.0)
             write_history(report.as_dict(), plot.resolve())
@@ -122,30 +156,14 @@ def bake(
 
 
 @contextmanager
-def _helpers(farm: FarmSpec) -> Iterator[Helpers]:
-    """Yield what starts the workers that were asked for. Raises BakeError if the cluster is out of reach."""
-    helpers = DaskWorkers(farm.scheduler) if farm.scheduler else LocalWorkers(farm.workers)
-    try:
-        yield helpers
-    finally:
-        helpers.end()
-
-
-def run_through(job: Generator[Status, None, T], console: Console, interrupts: Interrupts) -> T:
-    """Run a job to its end and return its report; interrupts end it, but not while it writes files."""
-    try:
-        while True:
-            try:
-                status = next(job)
-            except StopIteration as done:
-                report: T = done.value
-                return report
-            interrupts.check()
-            interrupts.deferred = status.stage in WRITING_STAGES
-            console.progress(status.stage, status.fraction, status.expected)
-    finally:
-        interrupts.deferred = True
-        job.close()
+def _shared_with(output: Path, spool: Path | None, farm: FarmSpec | None) -> Iterator[Baking | None]:
+    """Yield the pipeline shared through a spool if one is given or workers are, else None."""
+    if spool is None and farm is None:
+        yield None
+        return
+    folder = own_spool(output) if spool is None else given_spool(spool)
+    with wanted_helpers(farm) as helpers, folder as shared:
+        yield shared_pipeline(partial(shared_bake, shared, helpers))
 
 
 def _places(report_copy: Path | None, plot: Path | None) -> dict[str, Path]:

@@ -13,6 +13,7 @@ from functools import partial
 import bpy
 import numpy as np
 
+from ...base import elsewhere
 from ...lightmap.images import SurfaceTiles, lay_out_surfaces
 from ...numerics import MAX_REFLECTANCE, radiance_of_radiosity, radiosity_of_radiance, triangle_areas
 from ...options import BakeSettings
@@ -22,7 +23,6 @@ from ..materials.materials import Surface
 from ..materials.surface_terms import passing_color, surface_of_terms
 from ..scene_records.export_sources import MaterialSource
 from ..scene_records.pieces import Piece
-from ..session.background import elsewhere
 from .surface_bake import SurfaceBake
 from .surface_batches import Batch, batches, material_facts
 from .surface_rewiring import EXPRESSIONS

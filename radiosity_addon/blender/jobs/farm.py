@@ -7,15 +7,15 @@ from pathlib import Path
 
 import bpy
 
+from ...bake import Baking
 from ...base import BakeError
-from ...farm import FarmCommand, shared_in_folder
+from ...farm import FarmCommand, shared_in_folder, shared_pipeline
 from ..settings.preferences import preferences
 from .finish import BakeJob
-from .job import Sharing
 
 
-def farm_of(context: bpy.types.Context) -> tuple[FarmCommand | None, Sharing | None]:
-    """Return the command that the preferences give, and how a bake is shared; nothing if they do not.
+def farm_of(context: bpy.types.Context) -> tuple[FarmCommand | None, Baking | None]:
+    """Return the command that the preferences give, and the bake shared with it; nothing if they do not.
 
     Raises BakeError if there is no such folder for spools.
     """
@@ -29,7 +29,7 @@ def farm_of(context: bpy.types.Context) -> tuple[FarmCommand | None, Sharing | N
     if not place.is_dir():
         raise BakeError(f"Spool Folder '{folder}' in the preferences is no folder: make it, or mount it")
     started = FarmCommand(command)
-    return started, partial(shared_in_folder, place, started)
+    return started, shared_pipeline(partial(shared_in_folder, place, started))
 
 
 def ended_with(job: BakeJob, command: FarmCommand) -> BakeJob:

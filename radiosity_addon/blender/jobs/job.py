@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import AbstractContextManager, ExitStack
-from dataclasses import replace
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from functools import partial
 
 import bpy
 
-from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pages, run_pipeline, timed
+from ...bake import (
+    BakePlan,
+    Baking,
+    KeepOptions,
+    pages_of,
+    plan_bake,
+    refuse_bake,
+    refuse_large_pages,
+    run_pipeline,
+    timed,
+)
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
-from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
-from ...farm import ShareRecord
+from ...base import BakeWarning, NothingToDoError, Progress, Status, in_thread, staged
 from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
@@ -26,12 +35,9 @@ from ..images.images import possible_names
 from ..relight import lightmap_versions
 from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
-from ..session.background import in_thread
 from .finish import BakeJob, Copies, Scope, applying, finish
 from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
-
-Sharing = Callable[[], AbstractContextManager[ShareRecord]]
 
 SOLVE = 0.03
 """How far the whole is when the scene has been read; rough."""
@@ -55,7 +61,7 @@ def run_bake(
     only_changed: bool = False,
     notes: tuple[BakeWarning, ...] = (),
     with_preview: bool = True,
-    sharing: Sharing | None = None,
+    baking: Baking | None = None,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -73,14 +79,12 @@ def run_bake(
         then. If objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
     notes: What is known before the bake and belongs into its report.
     with_preview: False leaves `preview.png` out.
-    sharing: Called when the pipeline begins, in its thread: shares with workers what is baked within.
+    baking: Takes the pipeline's place, in its thread.
     Yields status: The stage that begins or goes on. A picture holds what the viewports show as surfaces.
     Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
-    # Now, not after the export: large pages need much memory, even if they are nearly empty.
-    refuse_large_pages(pages_of(settings) or (), settings)
-    lightmap_versions.flush()
+    _begin(settings)
     with ExitStack() as stack:
         if output is not None:
             # First: a folder that cannot be written, or holds files of others, is no news for after the work.
@@ -92,20 +96,9 @@ def run_bake(
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
             for _ in output.expecting((*own_copies, *sidecars)):
                 yield Status("export", 0.0)
-        originals = Originals(context)
         with timed(seconds, "export"):
-            steps = export_steps(context, settings, keeping is not None, in_background, originals)
-            export = yield from staged(steps, "export", 0.0, 0.0)
-            yield Status("export", 0.0)
-            with originals():
-                context.view_layer.update()
-                check_targets(export)
-                seen = seen_triangles(context, export)
-        plan, scope, cannot_keep = _plan(context.scene, export, settings, keeping, only_changed)
-        export = replace(export, bake_scene=plan.bake_scene)
-        keeping = None if scope.in_scene else keeping
-        shared = shared_warnings(context.scene, export)
-        warnings = (*notes, *originals.warnings, *shared, *plan.warnings, *cannot_keep)
+            planned = yield from _planned(context, settings, keeping, only_changed, in_background)
+        plan, scope, export, keeping = planned.plan, planned.scope, planned.export, planned.keeping
         if output is not None:
             shown = files_shown_by(scope.keep)
             lightmaps = possible_names(output.names, plan.settings, plan.bake_scene, output.path, shown)
@@ -114,9 +107,9 @@ def run_bake(
         copies = Copies(SAMPLES if with_preview else None) if with_copy and output is not None else None
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         solved, _ = applying(copies)
-        baking = partial(_share, sharing, partial(run_pipeline, plan, keeping, sidecar))
-        result, kept = yield from _solve(baking, seen, in_background, solved)
-        result = replace(result, warnings=(*warnings, *result.warnings))
+        work = partial(baking or run_pipeline, plan, keeping, sidecar)
+        result, kept = yield from _solve(work, planned.seen, in_background, solved)
+        result = replace(result, warnings=(*notes, *planned.warnings, *result.warnings))
         seconds.update(result.seconds)
         yield Status("apply", solved)
         finished = finish(
@@ -133,6 +126,68 @@ def run_bake(
             copies=copies,
         )
         return (yield from finished)
+
+
+def prepare_bake(
+    context: bpy.types.Context, settings: BakeSettings, keeping: KeepOptions | None
+) -> Generator[Status, None, PlannedBake]:
+    """Export the context's scene and plan its bake, without baking; the scene stays as it was.
+
+    Raises RadiosityError: Whatever a bake would refuse before it begins to unwrap.
+    """
+    _begin(settings)
+    yield Status("export", 0.0)
+    planned = yield from _planned(context, settings, keeping)
+    yield Status("export", 1.0)
+    plan = planned.plan
+    refuse_bake(plan.bake_scene, plan.settings, keep=planned.keeping is not None)
+    return planned
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedBake:
+    """A scene that was exported, and what of it is to be baked.
+
+    keeping: How the bake is kept, if it can be.
+    warnings: What is known before the bake.
+    seen: The triangles that viewports show.
+    """
+
+    export: Export
+    plan: BakePlan
+    scope: Scope
+    keeping: KeepOptions | None
+    warnings: tuple[BakeWarning, ...]
+    seen: Array
+
+
+def _begin(settings: BakeSettings) -> None:
+    """Refuse pages that are too large now, not after the export, and write lightmaps that wait for it."""
+    refuse_large_pages(pages_of(settings) or (), settings)
+    lightmap_versions.flush()
+
+
+def _planned(
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    keeping: KeepOptions | None,
+    only_changed: bool = False,
+    in_background: bool = False,
+) -> Generator[Status, None, PlannedBake]:
+    """Export the scene and plan its bake."""
+    originals = Originals(context)
+    steps = export_steps(context, settings, keeping is not None, in_background, originals)
+    export = yield from staged(steps, "export", 0.0, 0.0)
+    yield Status("export", 0.0)
+    with originals():
+        context.view_layer.update()
+        check_targets(export)
+        seen = seen_triangles(context, export)
+    plan, scope, cannot_keep = _plan(context.scene, export, settings, keeping, only_changed)
+    export = replace(export, bake_scene=plan.bake_scene)
+    shared = shared_warnings(context.scene, export)
+    warnings = (*originals.warnings, *shared, *plan.warnings, *cannot_keep)
+    return PlannedBake(export, plan, scope, None if scope.in_scene else keeping, warnings, seen)
 
 
 def _plan(
@@ -156,21 +211,6 @@ def _plan(
         return plan, Scope.of(scene, replace(export, bake_scene=plan.bake_scene), is_partial=True), ()
     cannot_keep = scope.in_scene and keeping is not None
     return plan, scope, (_cannot_relight(len(scope.in_scene)),) if cannot_keep else ()
-
-
-def _share(
-    sharing: Sharing | None,
-    baking: Callable[[Progress], tuple[BakeResult, KeptBake | None]],
-    progress: Progress,
-) -> tuple[BakeResult, KeptBake | None]:
-    """Run the pipeline, with the help of workers if that is wanted."""
-    if sharing is None:
-        return baking(progress)
-    with sharing() as record:
-        result, kept = baking(progress)
-    lines = tuple(BakeWarning("workers", line) for line in record.problems)
-    performance = {**result.performance, "shared": record.by_kernel()}
-    return replace(result, warnings=(*lines, *result.warnings), performance=performance), kept
 
 
 def _solve(

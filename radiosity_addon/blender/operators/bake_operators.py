@@ -65,7 +65,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
         keeping = self._keeping(context.scene, settings)
         if in_window and context.scene.radiosity.show_while_solving:
             live_view.begin(context.scene)
-        command, sharing = farm_of(context)
+        command, baking = farm_of(context)
         job = run_bake(
             context,
             settings,
@@ -73,7 +73,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
             in_background=in_window,
             keeping=keeping,
             only_changed=changed,
-            sharing=sharing,
+            baking=baking,
         )
         return job if command is None else ended_with(job, command)
 

@@ -19,11 +19,10 @@ import numpy as np
 from ...bake.relight import Responses, are_wanted
 from ...bake.result import LightGroup
 from ...bake.scene_diff import RELIGHTABLE
-from ...base import BakeError, Progress, RadiosityError
+from ...base import BakeError, Progress, RadiosityError, in_thread
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..images.group_images import update_images
-from ..session.background import in_thread
 from ..session.redraw import redraw_viewports
 from ..session.state import session
 from . import kept_bakes, lightmap_versions

@@ -21,12 +21,11 @@ from ...bake.relight import (
 from ...bake.result import LightGroup
 from ...bake.scene_diff import OF_NO_CONSEQUENCE
 from ...bake.sidecar import StoredBake, read_sidecar
-from ...base import SILENT, BakeError, BakeWarning, Progress, Status, drain, staged
+from ...base import SILENT, BakeError, BakeWarning, Progress, Status, drain, in_thread, staged
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..apply.rebake import Originals
 from ..scene_export.export import export_steps
-from ..session.background import in_thread
 from ..settings.option_properties import changed_labels
 from . import kept_bakes, lightmap_versions
 from .kept_bakes import InMemory

@@ -11,7 +11,7 @@ from typing import TypeVar
 import bpy
 import numpy as np
 
-from ...base import BakeWarning, SceneError, UsageError, drain
+from ...base import BakeWarning, SceneError, UsageError, drain, elsewhere
 from ...lights import EnvironmentLight
 from ...options import BakeSettings
 from ...scene import BakeObject, BakeScene, Scene, SurfaceImages
@@ -26,7 +26,6 @@ from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_options import option_warnings, world_of
 from ..scene_records.render_state import leave_edit_mode, render_depsgraph
-from ..session.background import elsewhere
 from .collect import collect_steps
 from .levels_of_detail import level_of_detail, pieces_named, with_levels
 from .page_checks import check_pages

@@ -198,9 +198,11 @@ class _SubCellGather:
             self._known[number] = hits.take(kept), np.zeros(int(kept.sum()), dtype=bool)
 
     def _rays(self, met: Array) -> Array:
-        """Return (p,) int: with how many rays cells gather, by how often they were met."""
-        step = np.searchsorted([least for least, _ in RAYS_OF_MET], met, side="right") - 1
-        return np.minimum(np.array([rays for _, rays in RAYS_OF_MET])[np.maximum(step, 0)], self._most_rays)
+        """Return (p,) uint16: with how many rays cells gather, by how often they were met, uint8."""
+        step = np.searchsorted([least for least, _ in RAYS_OF_MET], np.arange(MOST_MET + 1), side="right") - 1
+        rays = np.array([rays for _, rays in RAYS_OF_MET], dtype=np.uint16)[np.maximum(step, 0)]
+        # Looked up: there may be millions, while memory is short.
+        return np.asarray(np.minimum(rays, self._most_rays).astype(np.uint16)[met])
 
     def take_known(self) -> None:
         """Take the known cells that were met, and those that these met in turn.
@@ -219,22 +221,24 @@ class _SubCellGather:
 
     def gather_new(self, progress: Progress) -> bool:
         """Gather from the cells that were met and have not gathered yet; return whether there were any."""
-        new = np.flatnonzero((self._met > 0) & ~self._gathered)
-        self._gathered[new] = True
-        number = new + self._first
-        rays_of, is_elements = self._rays(self._met[new]), number < self._table.first_cell
+        number = np.flatnonzero((self._met > 0) & ~self._gathered)
+        self._gathered[number] = True
+        rays_of = self._rays(self._met[number])
+        number += self._first
+        is_elements = number < self._table.first_cell
         groups = [
-            (of_element, rays, number[(is_elements == of_element) & (rays_of == rays)])
+            (of_element, rays)
             for of_element in (True, False)
             for rays in sorted({min(rays, self._most_rays) for _, rays in RAYS_OF_MET})
         ]
-        for (of_element, rays, cells), part in progress.each(groups):
+        for (of_element, rays), part in progress.each(groups):
+            cells = number[(is_elements == of_element) & (rays_of == rays)]
             for tile, of_tile in part.each(list(tiles(len(cells)))):
                 found = self._found.get((of_element, rays))
                 if found is None:
                     found = self._found[of_element, rays] = _FoundCells(self._table, of_element, rays)
                 self.count(found.gather(cells[tile], of_tile))
-        return len(new) > 0
+        return len(number) > 0
 
     def small(self) -> Array:
         """Return (s,) int64, ascending: smaller cells of elements that were met, and of texels that gathered.
@@ -298,12 +302,12 @@ class _FoundCells:
         if self._tints is not None:
             tints = self._tints.more(len(number)).reshape(len(number), self._rays, 3)
         self._table.gather(number, self._of_element, self._rays, (sources, tints), progress)
-        self._numbers.append(number)
+        self._numbers.append(number.astype(np.int32))
         return sources
 
     def all(self) -> SubCellHits:
         """Return all that gathered."""
-        number, sources = np.concatenate(self._numbers), self._sources.all()
+        number, sources = np.concatenate(self._numbers, dtype=np.int64), self._sources.all()
         tints = None if self._tints is None else self._tints.all().reshape(*sources.shape, 3)
         return SubCellHits(self._of_element, number, sources, tints=tints)
 

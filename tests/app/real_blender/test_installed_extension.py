@@ -121,6 +121,26 @@ def test_workers_run_in_blenders_python(installed: Installed, cornell_blend: Pat
     assert "0 tasks done" in done.stdout
 
 
+def test_stages_run_in_blender(installed: Installed, cornell_blend: Path) -> None:
+    """As Flamenco does it: three commands of the Blender that is installed, the middle one without a file."""
+    alone, staged, spool = (installed.folder / name for name in ("at-once", "staged", "prepared-in"))
+    radiosity = ["--command", "radiosity"]
+    options = ["--resolution", "192", "--quality", "sketch", "--no-preview", "--quiet"]
+    commands = [
+        ["-b", cornell_blend, *radiosity, "bake", "--output", alone, *options],
+        ["-b", cornell_blend, *radiosity, "prepare", "--spool", spool, *options],
+        ["-b", *radiosity, "run", spool, "--farm", "local:1", "--quiet"],
+        ["-b", cornell_blend, *radiosity, "finish", "--spool", spool, "--output", staged, "--quiet"],
+    ]
+    for command in commands:
+        done = installed.run(*command)
+        assert done.returncode == 0, done.stdout
+    assert (alone / "lightmap.exr").read_bytes() == (staged / "lightmap.exr").read_bytes()
+    report = json.loads((staged / "report.json").read_text())
+    assert not [each for each in report["warnings"] if each["name"] == "workers"]
+    assert sorted(path.name for path in spool.iterdir()) == ["finished", "over", "spool.json"]
+
+
 def _lit_mean(path: Path) -> np.ndarray:
     """Mean color of the texels that hold light, (3,)."""
     image = bpy.data.images.load(str(path))

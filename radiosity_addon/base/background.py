@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
-from ...base import Cancelled, Progress, Status
+from .progress import Cancelled, Progress, Status
 
 R = TypeVar("R")
 
