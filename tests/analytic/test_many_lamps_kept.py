@@ -160,15 +160,22 @@ def test_a_box_that_moved_is_as_in_a_full_bake(baked: tuple[BakeResult, KeptBake
 
 
 def test_light_that_rays_were_not_aimed_at_causes_a_warning() -> None:
-    """A bulb that shines at a spot of the ceiling, of which a bake of another lamp has few rays."""
-    parts = np.zeros(2)
-    parts[0] = 1.0
-    kept = bake_and_keep(room(2, strengths=parts), SETTINGS)[1]
+    """A bulb next to the ceiling, most of whose light comes from a spot that was dark in the bake."""
+    scene = room(1)
+    bulb = PointLight((1.0, 1.0, 2.45), np.zeros(3), 0.02, name="Bulb")
+    scene = replace(scene, scene=scene.scene.with_lights([*scene.scene.lights, bulb]))
+    kept = bake_and_keep(scene, SETTINGS)[1]
     assert noise_warnings(kept, kept.strengths) == ()
-    wanted = np.zeros((2, 3))
-    wanted[1] = POWER
+    wanted = np.array([(0.0, 0.0, 0.0), (POWER, POWER, POWER)])
     relight_pages(kept, wanted)
-    assert [warning.name for warning in noise_warnings(kept, wanted)] in ([], ["scene"])
+    (warning,) = noise_warnings(kept, wanted)
+    assert "bake again" in warning.message
+
+
+def test_so_many_lamps_that_they_share_rays_cause_a_note(baked: tuple[BakeResult, KeptBake]) -> None:
+    notes = [warning for warning in bake_and_keep(room(150), SETTINGS)[0].warnings if warning.is_note]
+    assert any("150 lamps" in note.message for note in notes)
+    assert not any("100 lamps" in warning.message for warning in baked[0].warnings)
 
 
 def test_scenes_are_not_changed() -> None:
