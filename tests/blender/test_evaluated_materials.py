@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.cycles import surface_bake
+from radiosity_addon.blender.materials.gloss import Gloss
 from radiosity_addon.blender.materials.materials import read_material
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -31,10 +32,14 @@ def _images(resolution: int = 128) -> SurfaceImages:
     return images
 
 
+@pytest.mark.parametrize("gloss", [Gloss(), Gloss(filtered=1.0), Gloss(reflective=False)])
 @pytest.mark.parametrize("kind", ZOO)
-def test_evaluated_values_are_those_read_as_constants(kind: str) -> None:
+def test_evaluated_values_are_those_read_as_constants(kind: str, gloss: Gloss) -> None:
+    cycles = bpy.context.scene.cycles
+    cycles.caustics_reflective, cycles.blur_glossy = gloss.reflective, gloss.filtered
+    assert Gloss.of(bpy.context.scene) == gloss
     material = ZOO[kind]()
-    read = read_material(material, lets_through=True)
+    read = read_material(material, lets_through=True, gloss=gloss)
     assert not read.varies
     make_all_vary(material.node_tree)
     assert read_material(material, lets_through=True).varies

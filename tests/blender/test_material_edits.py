@@ -15,6 +15,7 @@ from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
 from radiosity_addon.blender.material_copies.material_digest import digest_of_material
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.material_edits.stripping import stripped_copy
+from radiosity_addon.blender.materials.gloss import Gloss
 from radiosity_addon.blender.materials.materials import read_material
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -109,7 +110,7 @@ def test_a_base_color_survives_restore_and_is_baked(
         assert warnings == ()
         scene = export_scene(bpy.context, BakeSettings()).bake_scene.scene
         paint = bpy.data.materials["Paint"]
-        expected = read_material(paint).reflectance
+        expected = read_material(paint, gloss=Gloss.of(bpy.context.scene)).reflectance
     if edit is not texture_behind_the_color:
         assert base_color(paint) == pytest.approx(GREEN)
         assert expected[1] > 0.65

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.blender.materials.gloss import Gloss
 from radiosity_addon.blender.materials.materials import read_material
 from tests.blender.scenes import shader_material
 from tests.blender.test_materials import BLUE, RED, assert_surface, messages_of
@@ -54,6 +56,50 @@ def test_principled_bounces_what_cycles_measures_in_a_closed_room(
     values = {"Base_Color": (base, base, base, 1), "Metallic": metallic, "Roughness": roughness}
     surface = read_material(shader_material("M", "ShaderNodeBsdfPrincipled", **values))
     np.testing.assert_allclose(surface.reflectance, measured, atol=0.017)
+
+
+@pytest.mark.parametrize(
+    ("filtered", "metallic", "roughness", "base", "measured"),
+    [
+        # The same in Cycles of Blender 5.0 with Filter Glossy, 1,024 samples.
+        (1, 0, 0.1, 0.8, 0.7765),
+        (1, 0, 0.5, 0.8, 0.7947),
+        (1, 0, 0.1, 0.4, 0.4121),
+        (1, 0, 0.5, 0.4, 0.4174),
+        (1, 0, 1.0, 0.4, 0.4110),
+        (1, 1, 0.1, 0.8, 0.5842),
+        (1, 1, 0.5, 0.8, 0.6415),
+        (1, 1, 0.9, 0.8, 0.6681),
+        (1, 1, 0.1, 0.4, 0.2948),
+        (4, 0, 0.1, 0.8, 0.7749),
+        (4, 1, 0.1, 0.8, 0.5622),
+        (4, 1, 0.5, 0.4, 0.2948),
+    ],
+)
+def test_filter_glossy_takes_what_it_takes_in_cycles(
+    filtered: float, metallic: float, roughness: float, base: float, measured: float
+) -> None:
+    values = {"Base_Color": (base, base, base, 1), "Metallic": metallic, "Roughness": roughness}
+    material = shader_material("M", "ShaderNodeBsdfPrincipled", **values)
+    surface = read_material(material, gloss=Gloss(filtered=filtered))
+    np.testing.assert_allclose(surface.reflectance, measured, atol=0.017)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
+def test_without_reflective_caustics_gloss_is_left_out(roughness: float) -> None:
+    """Cycles then bounces base colors, which nothing covers, and no metal: 0.7997, 0.3999 and 0.0000."""
+    values = {"Base_Color": RED, "Roughness": roughness}
+    lacquer = shader_material("Lacquer", "ShaderNodeBsdfPrincipled", **values)
+    metal = shader_material("Metal", "ShaderNodeBsdfPrincipled", Metallic=1, **values)
+    mirror = shader_material("Mirror", "ShaderNodeBsdfGlossy", Color=RED, Roughness=roughness)
+    none = Gloss(reflective=False)
+    np.testing.assert_allclose(read_material(lacquer, gloss=none).reflectance, RED[:3], rtol=1e-6)
+    assert not read_material(metal, gloss=none).reflectance.any()
+    assert not read_material(mirror, gloss=none).reflectance.any()
+
+
+def test_gloss_is_filtered_as_a_new_scene_says() -> None:
+    assert Gloss.of(bpy.context.scene) == Gloss(reflective=True, filtered=1.0)
 
 
 def test_principled_emits_strength_times_color() -> None:

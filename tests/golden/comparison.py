@@ -71,6 +71,7 @@ def bake_row(row: Row, quality: str = "medium") -> BakeResult:
     """Build a row into an empty file and bake it on the layout it brings."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     row.build()
+    bpy.context.scene.cycles.blur_glossy = 0.0  # as for the references (`bench/cycles.py`)
     names = tuple(obj.name for obj in objects_with_layout(bpy.context.scene))
     settings = BakeSettings(resolution=row.resolution, keep_uvs=True, quality=quality, objects=names)
     return bake(export_scene(bpy.context, settings).bake_scene, settings)

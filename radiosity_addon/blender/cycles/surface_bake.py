@@ -89,7 +89,9 @@ class SurfaceBake:
             for row, source in materials.items():
                 if source is None:
                     continue
-                self._rewired[row] = RewiredMaterial(source.find(), self._attributes, source.lets_through)
+                self._rewired[row] = RewiredMaterial(
+                    source.find(), self._attributes, source.lets_through, source.gloss
+                )
                 self._made += self._rewired[row].made
             self._scene = _new_scene(context.scene, context.view_layer, settings)
             self._made.append(self._scene)

@@ -78,7 +78,7 @@ def material_facts(
         if time.perf_counter() > until:
             yield len(facts) / len(materials)
             until = time.perf_counter() + MOMENT
-        rewired = RewiredMaterial(source.find(), attribute_names(inputs), source.lets_through)
+        rewired = RewiredMaterial(source.find(), attribute_names(inputs), source.lets_through, source.gloss)
         varying = frozenset(channel for channel in EXPRESSIONS if not rewired.is_constant(channel))
         facts[row] = MaterialFacts(varying, rewired.node_count)
         remove_datablocks(rewired.made)

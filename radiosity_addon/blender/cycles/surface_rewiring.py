@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ..datablocks.image_values import known_means_only
+from ..materials.gloss import ALL, Gloss
 from ..materials.node_algebra import NodeAlgebra, NodeColor, Scalar, is_socket
 from ..materials.shader_nodes import (
     MissingImageError,
@@ -39,11 +40,15 @@ class RewiredMaterial:
 
     original: One with nodes.
     attributes mapping of str to str: The names of the mesh attributes that hold inputs of the nodes.
-    lets_through: See `read_material`.
+    lets_through, gloss: See `read_material`.
     """
 
     def __init__(
-        self, original: bpy.types.Material, attributes: Mapping[str, str], lets_through: bool = False
+        self,
+        original: bpy.types.Material,
+        attributes: Mapping[str, str],
+        lets_through: bool = False,
+        gloss: Gloss = ALL,
     ) -> None:
         self.made: list[bpy.types.ID] = []
         """The datablocks to remove in the end."""
@@ -57,7 +62,8 @@ class RewiredMaterial:
         output = output_node(self._tree)
         self._terms = nothing()
         if output is not None:
-            self._terms = _Rewiring(lets_through).shader(output.inputs["Surface"], _Place(self._tree))
+            rewiring = _Rewiring(lets_through, gloss)
+            self._terms = rewiring.shader(output.inputs["Surface"], _Place(self._tree))
         self._finish(output)
 
     @property
@@ -144,8 +150,8 @@ class _Place:
 class _Rewiring(ShaderTerms[_Place]):
     """Builds the expressions in the tree of a copied material."""
 
-    def __init__(self, lets_through: bool = False) -> None:
-        self.lets_through = lets_through
+    def __init__(self, lets_through: bool, gloss: Gloss) -> None:
+        self.lets_through, self.gloss = lets_through, gloss
 
     def shader(self, socket: bpy.types.NodeSocket, place: _Place) -> Terms:
         feed = feed_of(socket, enter_groups=False)

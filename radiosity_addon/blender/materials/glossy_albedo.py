@@ -23,19 +23,28 @@ _FAINT = 0.003
 """Where F0 is not much more than this, there is less to add at grazing angles: none at 0."""
 
 
-def metal(algebra: NodeAlgebra, base: NodeColor, roughness: Scalar, multiple: bool) -> NodeColor:
+def metal(
+    algebra: NodeAlgebra, base: NodeColor, roughness: Scalar, multiple: bool, rougher: Scalar | None = None
+) -> NodeColor:
     """Return the albedo of a metal of color `base`.
 
     multiple: With multiple scattering, by which a rough metal is not darker but deeper in color.
+    rougher: The roughness that light meets, if it is not that by which multiple scattering is reckoned.
     """
+    met = roughness if rougher is None else rougher
     white = _white(algebra, roughness)
-    single = algebra.scale(base, white)
+    single = algebra.scale(base, _white(algebra, met))
     if multiple:
         # One minus base times what misses the first scattering.
         missed = algebra.scale(base, algebra.calculate("SUBTRACT", white, 1.0))
         single = algebra.divide(single, algebra.add(np.ones(3), missed))
     rest = algebra.add(np.ones(3), algebra.scale(base, -1.0))
-    return algebra.add(single, algebra.scale(rest, _grazing(algebra, roughness)))
+    return algebra.add(single, algebra.scale(rest, _grazing(algebra, met)))
+
+
+def kept_if_rougher(algebra: NodeAlgebra, roughness: Scalar, rougher: Scalar) -> Scalar:
+    """Return the share of what a mirror reflects that is left if its microfacets become rougher."""
+    return algebra.calculate("DIVIDE", _white(algebra, rougher), _white(algebra, roughness))
 
 
 def dielectric(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar) -> Scalar:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...base import BakeWarning
 from ...numerics import MAX_REFLECTANCE, most_reflectance, radiosity_of_radiance
+from .gloss import ALL, Gloss
 from .node_algebra import NodeAlgebra
 from .shader_nodes import (
     MissingImageError,
@@ -84,14 +85,17 @@ class Surface:
         return self.glass and not self.reflectance.any() and not self.emission.any()
 
 
-def read_material(material: bpy.types.Material | None, lets_through: bool = False) -> Surface:
+def read_material(
+    material: bpy.types.Material | None, lets_through: bool = False, gloss: Gloss = ALL
+) -> Surface:
     """Return what a material reflects, emits and covers; None is Cycles' default gray.
 
     lets_through: Light goes through glass; else it is opaque, and what goes through the rest is gray.
+    gloss: What is left of gloss after a diffuse bounce.
     """
     if material is None:
         return Surface(np.full(3, DEFAULT_GRAY), np.zeros(3))
-    reader = _Reader(material.name, "material", lets_through)
+    reader = _Reader(material.name, "material", lets_through, gloss)
     if not uses_nodes(material):
         terms = Terms(np.array(material.diffuse_color[:3], dtype=np.float64), np.zeros(3), np.zeros(3))
     else:
@@ -187,10 +191,10 @@ def uses_nodes(owner: bpy.types.ID) -> bool:
 class _Reader(ShaderTerms[Stack]):
     """Reads one node tree as constants and collects its warnings."""
 
-    def __init__(self, name: str, kind: str, lets_through: bool = False) -> None:
+    def __init__(self, name: str, kind: str, lets_through: bool = False, gloss: Gloss = ALL) -> None:
         self.name = name
         self.kind = kind
-        self.lets_through = lets_through
+        self.lets_through, self.gloss = lets_through, gloss
         self.is_glass = False
         self.warnings: list[BakeWarning] = []
         self.fallbacks: list[BakeWarning] = []

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from . import glossy_albedo
+from .gloss import ALL
 from .node_algebra import NodeAlgebra, NodeColor, Scalar
 from .shader_nodes import Feed, default_rgb
 
@@ -39,6 +40,9 @@ DIFFUSE = (
     "EEVEE_SPECULAR",
 )
 """Shaders that are diffuse, or are taken as diffuse ones of their color."""
+
+MIRRORS = ("BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC")
+"""Those of them that reflect like mirrors."""
 
 GLASS = ("BSDF_GLASS", "BSDF_REFRACTION")
 """Shaders that light passes by their color."""
@@ -159,9 +163,11 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
 
     lets_through: Light goes straight through glass, and Fresnel's equations take nothing of it; else glass
         is opaque.
+    gloss: What is left of gloss after a diffuse bounce.
     """
 
     lets_through = False
+    gloss = ALL
 
     @abstractmethod
     def color(self, socket: bpy.types.NodeSocket, place: Place) -> NodeColor:
@@ -189,6 +195,8 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
         if node.type == "BSDF_DIFFUSE":
             self._normal_map(node)
         reflected = self.color(color, place)
+        if node.type in MIRRORS:
+            reflected = self._mirrored(reflected, self.scalar(node.inputs["Roughness"], place), place)
         if node.type != "BSDF_DIFFUSE":
             self.warn(f"{node.bl_label} is baked as diffuse; its color is used")
         return Terms(reflected, np.zeros(3), np.zeros(3))
@@ -249,10 +257,25 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             return np.zeros(3)
         return self.algebra(place).scale(self.color(color, place), self.scalar(strength, place))
 
+    def _mirrored(self, color: NodeColor, roughness: Scalar, place: Place) -> NodeColor:
+        """Return what is left of what a mirror reflects after a diffuse bounce."""
+        if not self.gloss.reflective:
+            return np.zeros(3)
+        if self.gloss.least_roughness == 0.0:
+            return color
+        algebra, rougher = self.algebra(place), self._rougher(roughness, place)
+        return algebra.scale(color, glossy_albedo.kept_if_rougher(algebra, roughness, rougher))
+
+    def _rougher(self, roughness: Scalar, place: Place) -> Scalar:
+        """Return the roughness of gloss after a diffuse bounce."""
+        least = self.gloss.least_roughness
+        return self.algebra(place).calculate("MAXIMUM", roughness, least) if least else roughness
+
     def _principled_albedo(self, node: bpy.types.Node, place: Place) -> NodeColor:
         """Return metallic · metal + (1 − metallic) · (shine + (1 − shine) (1 − transmission) base).
 
-        Where light goes through glass, what is transmitted has no shine either.
+        Where light goes through glass, what is transmitted has no shine either. Of metal and of the first
+        shine counts what is left after a diffuse bounce.
         """
         algebra, inputs = self.algebra(place), node.inputs
         base = self.color(inputs["Base Color"], place)
@@ -260,19 +283,23 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
         transmission = algebra.saturate(self.scalar(inputs["Transmission Weight"], place))
         roughness = self.scalar(inputs["Roughness"], place)
         ior, level = (self.scalar(inputs[name], place) for name in ("IOR", "Specular IOR Level"))
-        shine = algebra.scale(
-            self.color(inputs["Specular Tint"], place),
-            glossy_albedo.dielectric(algebra, ior, level, roughness),
-        )
         under = base if self.lets_through else algebra.scale(base, algebra.complement(transmission))
-        kept = algebra.add(np.ones(3), algebra.scale(shine, -1.0))
-        matte = algebra.add(shine, algebra.multiply(kept, under))
+        matte, rougher = under, self._rougher(roughness, place)
+        if self.gloss.reflective:
+            tint = self.color(inputs["Specular Tint"], place)
+            over, shine = (
+                algebra.scale(tint, glossy_albedo.dielectric(algebra, ior, level, rough))
+                for rough in (roughness, rougher)
+            )
+            below = algebra.multiply(algebra.add(np.ones(3), algebra.scale(over, -1.0)), under)
+            matte = algebra.add(shine, below)
         if self.lets_through:
             matte = algebra.scale(matte, algebra.complement(transmission))
         if metallic == 0.0:
             return matte
         multiple = node.distribution == "MULTI_GGX"
-        return algebra.blend(metallic, matte, glossy_albedo.metal(algebra, base, roughness, multiple))
+        metal = glossy_albedo.metal(algebra, base, roughness, multiple, rougher)
+        return algebra.blend(metallic, matte, metal if self.gloss.reflective else np.zeros(3))
 
     def _mixed(self, node: bpy.types.Node, place: Place) -> Terms:
         first, second = (self.shader(socket, place) for socket in node.inputs[1:3])

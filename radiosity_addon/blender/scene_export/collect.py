@@ -22,6 +22,7 @@ from ..cycles.lamps import LampFactors, read_lamp
 from ..cycles.surface_bake import can_evaluate
 from ..datablocks.image_values import ImageKey, ImageMeans, UnknownMeanError, known_means_only, mean_of_named
 from ..datablocks.mesh_arrays import MeshArrays, RawMesh, copy_mesh_data, mesh_arrays, no_triangles
+from ..materials.gloss import ALL, Gloss
 from ..materials.materials import Surface, ray_doubts, read_material, uses_nodes
 from ..materials.shading_inputs import (
     MeshValues,
@@ -109,7 +110,7 @@ class _Collector:
 
     def __init__(self, factors: LampFactors, settings: BakeSettings, dark: bool) -> None:
         self._factors, self._dark = factors, dark
-        self._settings = settings
+        self._settings, self._gloss = settings, ALL
         self._found: dict[_Key, Found] = {}
         self._lights: dict[_Key, tuple[Light | None, str, tuple[BakeWarning, ...]]] = {}
         self._names: dict[_Key, str] = {}
@@ -185,6 +186,7 @@ class _Collector:
     def _prepare(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Note what holds as long as the scene is evaluated, and name what is new in it."""
         self._membership = Membership(depsgraph.scene.original)
+        self._gloss = Gloss.of(depsgraph.scene.original)
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[tuple[int, frozenset[str]], tuple[RawMesh, MeshValues]] = {}
         everything = depsgraph.scene_eval.objects
@@ -296,7 +298,7 @@ class _Collector:
         key = None if material is None else material.original.name_full
         if key not in self._surface_of:
             lets_through = lets_light_through(material, self._settings)
-            surface = read_material(material, lets_through)
+            surface = read_material(material, lets_through, self._gloss)
             asked: frozenset[str] = frozenset()
             warnings = list(surface.warnings)
             if material is not None and uses_nodes(material):
@@ -310,7 +312,7 @@ class _Collector:
             source = None
             if material is not None:
                 original = material.original
-                source = MaterialSource.of(original, name_on(original), lets_through)
+                source = MaterialSource.of(original, name_on(original), lets_through, self._gloss)
             self._surfaces.append((surface, source, warnings, asked))
         return self._surface_of[key]
 

@@ -8,6 +8,7 @@ import bpy
 
 from ...base import SceneError
 from ...scene import BakeScene
+from ..materials.gloss import ALL, Gloss
 
 Matrix4 = tuple[tuple[float, ...], ...]
 
@@ -52,19 +53,20 @@ class MaterialSource:
 
     library: File it is linked from; None for a local one.
     group: The light group that is named on it, or "".
-    lets_through: See `read_material`.
+    lets_through, gloss: See `read_material`.
     """
 
     name: str
     library: str | None
     group: str
     lets_through: bool = False
+    gloss: Gloss = ALL
 
     @staticmethod
-    def of(material: bpy.types.Material, group: str, lets_through: bool = False) -> MaterialSource:
+    def of(material: bpy.types.Material, group: str, lets_through: bool, gloss: Gloss) -> MaterialSource:
         """Return the source that finds a material."""
         library = material.library.filepath if material.library else None
-        return MaterialSource(material.name, library, group, lets_through)
+        return MaterialSource(material.name, library, group, lets_through, gloss)
 
     def find(self) -> bpy.types.Material:
         """Return the material.
