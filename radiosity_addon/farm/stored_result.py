@@ -39,11 +39,12 @@ class StoredResult:
 
     mark: The bake's own name (`KeepOptions`); "" if it was not kept.
     sidecar: The bytes of its file, if the bake was kept.
+    fields: What `result` makes a `BakeResult` of.
     """
 
     mark: str
     sidecar: Array | None
-    _stored: Mapping[str, Any] = field(repr=False)
+    fields: Mapping[str, Any] = field(repr=False)
 
     @classmethod
     def read(cls, spool: Spool, inputs: str) -> StoredResult:
@@ -70,7 +71,7 @@ class StoredResult:
 
     def result(self, bake_scene: BakeScene, settings: BakeSettings) -> BakeResult:
         """Return the result of a bake of this scene. Raises ValueError and others if it is of another one."""
-        stored, items = self._stored, {item.name: item for item in bake_scene.objects}
+        stored, items = self.fields, {item.name: item for item in bake_scene.objects}
         objects = tuple(BakedObject(items[name], *facts) for name, *facts in stored["objects"])
         groups = tuple(LightGroup(*group) for group in stored["groups"])
         others = {name: stored[name] for name in (*AS_THEY_ARE, *PLAIN)}

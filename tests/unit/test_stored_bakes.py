@@ -28,7 +28,7 @@ from radiosity_addon.farm import (
     run_command,
     store_prepared,
 )
-from radiosity_addon.farm.objects import Writer, digest_of
+from radiosity_addon.farm.objects import DigestsAlone, Writer, digest_of
 from radiosity_addon.farm.run_stage import run
 from radiosity_addon.farm.stages import bake_prepared, finished_into, finishing, stage_of
 from radiosity_addon.farm.stored_result import StoredResult
@@ -53,25 +53,15 @@ def inputs() -> BakeInputs:
 
 @pytest.fixture
 def prepared(spool: Spool, inputs: BakeInputs) -> PreparedBake:
-    assert store_prepared(
-        spool, inputs, PreparedBake("", SETTINGS, source="/home/me/room.blend", scene="Scene")
-    )
+    wanted = PreparedBake("", SETTINGS, source="/home/me/room.blend", scene="Scene")
+    assert store_prepared(spool, inputs, wanted)
     return prepared_in(spool)
 
 
 def same(one: Any, other: Any) -> None:
     """Assert that two values hold the same numbers."""
-    tree = Writer(_Digests())
+    tree = Writer(DigestsAlone())
     assert tree.tree(one) == tree.tree(other)
-
-
-class _Digests:
-    """What is written twice is the same if it has the same digests."""
-
-    def put_object(self, digest: str, text: str) -> None: ...
-
-    def put_array(self, array: np.ndarray) -> str:
-        return f"{array.dtype}{array.shape}{hash(array.tobytes())}"
 
 
 @pytest.mark.parametrize("scene", [room, glazed_room])
@@ -298,14 +288,14 @@ def test_results_that_no_bake_finds_are_refused(
     whole = result_in(spool, prepared)
     whole.result(inputs.bake_scene, SETTINGS)
     for what, change in RESULTS.items():
-        stored = {**whole._stored, "solver": dict(whole._stored["solver"])}
+        stored = {**whole.fields, "solver": dict(whole.fields["solver"])}
         change(stored)
         tree = Writer(spool).tree({"mark": "", "sidecar": None, "result": stored})
         spool.point(f"results/{prepared.inputs}", put(spool, tree))
         is_whole = StoredResult.is_whole(Spool(spool.path), prepared.inputs, inputs.bake_scene, SETTINGS)
         assert not is_whole, what
     for mark, sidecar in (("../x", None), ("A" * 32, None), (3, None), ("", np.zeros(3)), ("", "text")):
-        tree = Writer(spool).tree({"mark": mark, "sidecar": sidecar, "result": whole._stored})
+        tree = Writer(spool).tree({"mark": mark, "sidecar": sidecar, "result": whole.fields})
         spool.point(f"results/{prepared.inputs}", put(spool, tree))
         with pytest.raises(BakeError, match="is damaged"):
             result_in(Spool(spool.path), prepared)
