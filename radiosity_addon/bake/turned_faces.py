@@ -172,7 +172,8 @@ def turned_away(
         if share > MAX_TURNED_SHARE:
             turned = suspects[probe.all_lit(suspects, SEEN * usual)] - item.first
             unlit = lit[item.rows] <= SEEN * usual
-            polygons = turned_polygons(item, part, area, turned, unlit)
+            right = (front > SEEN * usual)[item.rows] & (back < DIM * front)[item.rows]
+            polygons = turned_polygons(item, part, area, turned, unlit, right)
             ways = "Flip Faces in the panel, or " * bool(polygons) + "Mesh → Normals → Flip"
             message = (
                 f"object '{item.name}' is lit from behind on {share:.0%} of its surface: normals point "
@@ -185,7 +186,7 @@ def turned_away(
 
 
 def turned_polygons(
-    item: BakeObject, part: Array, areas: Array, turned: Array, unlit: Array
+    item: BakeObject, part: Array, areas: Array, turned: Array, unlit: Array, right: Array
 ) -> tuple[int, ...]:
     """Return the polygons of an object that are to be flipped, in ascending order.
 
@@ -194,12 +195,15 @@ def turned_polygons(
     part (count,) int, areas (count,) [m²]: Of the object's triangles; parts as in `wound_parts`.
     turned (n,) int: Its triangles that are lit from behind.
     unlit (count,) bool: Those that get hardly any light on either side, and so decide nothing.
+    right (count,) bool: Those that are lit in front, and not from behind. A part that shows many stays.
     """
     is_turned = np.zeros(item.count, dtype=bool)
     is_turned[turned] = True
     of_part = np.bincount(part, areas * is_turned)
     decided = np.bincount(part, areas * (is_turned | ~unlit))
-    flips = ((of_part > 0) & (of_part >= MOSTLY * decided))[part]
+    lit_in_front = np.bincount(part, areas * right)
+    flips = (of_part > 0) & (of_part >= MOSTLY * decided) & (lit_in_front <= MAX_TURNED_SHARE * decided)
+    flips = flips[part]
     weight = np.maximum(areas, NO_AREA * areas.max())
     most = np.bincount(item.polygon, weight * flips) > 0.5 * np.bincount(item.polygon, weight)
     return tuple(np.flatnonzero(most).tolist())

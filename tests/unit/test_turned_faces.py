@@ -188,12 +188,17 @@ def test_parts_are_turned_as_a_whole_or_not_at_all() -> None:
     unlit[[0, 5]] = unlit[32:64] = True
     lit = np.setdiff1d(np.arange(32), [0, 5])
 
-    def found(lit_behind: int) -> tuple[int, ...]:
+    def found(lit_behind: int, lit_in_front: int = 0) -> tuple[int, ...]:
         part = wound_parts(places(triangles))
-        return turned_polygons(item, part, triangle_areas(triangles), lit[:lit_behind], unlit)
+        right = np.zeros(96, dtype=bool)
+        right[lit[len(lit) - lit_in_front :]] = True
+        return turned_polygons(item, part, triangle_areas(triangles), lit[:lit_behind], unlit, right)
 
     assert found(30) == found(15) == tuple(range(16))
     assert found(14) == ()
+    # A tenth of it that only its front's light reaches is not to go dark.
+    assert found(27, lit_in_front=3) == tuple(range(16))
+    assert found(26, lit_in_front=4) == ()
     # Faces that face the other way are a part of their own, though they go on where the wall ends.
     assert np.bincount(wound_parts(places(triangles))).tolist() == [32, 32, 32]
 
@@ -201,8 +206,8 @@ def test_parts_are_turned_as_a_whole_or_not_at_all() -> None:
 @pytest.mark.parametrize(("behind", "flips"), [(16, 16), (14, 0)])
 def test_the_button_is_offered_where_it_would_flip(behind: int, flips: int) -> None:
     scene = gray_scene(rectangle((0, 0, 0), (4, 0, 0), (0, 0, 4), 4))
-    front, back = np.ones(32), np.zeros(32)
-    front[:behind], back[:behind] = 0.0, 1.0
+    front, back = np.ones(32), np.ones(32)
+    front[:behind] = 0.0
     item = replace(bake_object("Wall", 0, 32), polygon=np.tile(np.arange(16), 2))
     (warning,) = turned_away([item], scene, front, back, AlwaysLit())
     assert len(warning.turned) == flips

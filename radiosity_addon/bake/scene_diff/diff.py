@@ -23,7 +23,7 @@ class Part(Enum):
     ROLE = "the role of object '{}' has changed, or how it is baked"
     UV = "object '{}' has other lightmap coordinates"
     PLACE = "object '{}' has moved, or changed its shape"
-    SURFACE = "object '{}' has another material"
+    SURFACE = "object '{}' has another material, or Cycles' settings of caustics changed"
     MATERIAL = "material '{}' reflects differently"
     TEXTURE = "a texture of object '{}', or its UV map, has changed"
     GLOW = "the pattern that object '{}' emits has changed, or its UV map"

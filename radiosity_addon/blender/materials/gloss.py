@@ -11,9 +11,6 @@ from dataclasses import dataclass
 
 import bpy
 
-FILTER_GLOSSY = 1.0
-"""Cycles' default."""
-
 MIN_PDF = 0.16
 """Of the directions that a path took from matte surfaces, cos / π, the least: its mean over two or three."""
 
@@ -31,10 +28,8 @@ class Gloss:
 
     @staticmethod
     def of(scene: bpy.types.Scene) -> Gloss:
-        """Return the settings of a scene, or Cycles' defaults where Cycles is not installed."""
-        cycles = getattr(scene, "cycles", None)
-        filtered = float(getattr(cycles, "blur_glossy", FILTER_GLOSSY))
-        return Gloss(bool(getattr(cycles, "caustics_reflective", True)), filtered)
+        """Return the settings of a scene."""
+        return Gloss(bool(scene.cycles.caustics_reflective), float(scene.cycles.blur_glossy))
 
     @property
     def least_roughness(self) -> float:

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager
 import bpy
 import numpy as np
 
-from ...base import BakeWarning
+from ...base import BakeWarning, SceneError
 from ...lights import Light
 from ...options import BakeSettings
 from ..cycles.lamps import LampFactors, read_lamp
@@ -89,6 +89,7 @@ def collect_steps(
     in_background: Whether a window waits.
     Returns sorted_out: Works on what was copied alone, in any thread; raises SceneError if a coordinate is
         NaN or infinite.
+    Raises SceneError if the add-on Cycles is disabled.
     """
     collector = _Collector(factors, settings, dark)
     means: ImageMeans = {}
@@ -186,6 +187,10 @@ class _Collector:
     def _prepare(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Note what holds as long as the scene is evaluated, and name what is new in it."""
         self._membership = Membership(depsgraph.scene.original)
+        if not hasattr(depsgraph.scene.original, "cycles"):
+            raise SceneError(
+                "the add-on Cycles is disabled, which evaluates materials: enable it in Preferences → Add-ons"
+            )
         self._gloss = Gloss.of(depsgraph.scene.original)
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[tuple[int, frozenset[str]], tuple[RawMesh, MeshValues]] = {}
