@@ -172,7 +172,11 @@ def turned_away(
         if share > MAX_TURNED_SHARE:
             turned = suspects[probe.all_lit(suspects, SEEN * usual)] - item.first
             unlit = lit[item.rows] <= SEEN * usual
-            right = (front > SEEN * usual)[item.rows] & (back < DIM * front)[item.rows]
+            right = (front > DARK * usual)[item.rows]
+            right[turned] = False
+            fine = np.flatnonzero(right)
+            reach = WITHIN * np.sqrt(np.bincount(part, area)[part[fine]])
+            right[fine] = ~probe.hidden(item.first + fine, reach)
             polygons = turned_polygons(item, part, area, turned, unlit, right)
             ways = "Flip Faces in the panel, or " * bool(polygons) + "Mesh → Normals → Flip"
             message = (
@@ -195,7 +199,7 @@ def turned_polygons(
     part (count,) int, areas (count,) [m²]: Of the object's triangles; parts as in `wound_parts`.
     turned (n,) int: Its triangles that are lit from behind.
     unlit (count,) bool: Those that get hardly any light on either side, and so decide nothing.
-    right (count,) bool: Those that are lit in front, and not from behind. A part that shows many stays.
+    right (count,) bool: Those whose fronts are lit, and seen from afar. A part that shows many stays.
     """
     is_turned = np.zeros(item.count, dtype=bool)
     is_turned[turned] = True
