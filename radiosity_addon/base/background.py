@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable, Generator
-from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
@@ -45,6 +44,8 @@ def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generato
     Closing the generator cancels the work, which ends when it next reports its progress. In a window this
     returns at once; otherwise it waits for the end of the work.
     """
+    from concurrent.futures import ThreadPoolExecutor  # not while the add-on is enabled
+
     news: SimpleQueue[Status] = SimpleQueue()
     closed = threading.Event()
 
