@@ -15,7 +15,7 @@ import pytest
 from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.farm import LocalWorkers, Spool, local_workers
 from radiosity_addon.farm.processes import HelpingProcess
-from radiosity_addon.farm.signs import this_process
+from radiosity_addon.farm.signs import SILENCE, this_process
 from tests.moments import until
 from tests.processes import ROOT
 
@@ -46,7 +46,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 def no_worker_is_left(tmp_path: Path) -> Iterator[None]:
     """However a test ends, no process of its spools goes on."""
     yield
-    until(lambda: not workers_of(tmp_path), 20)
+    until(lambda: not workers_of(tmp_path), SILENCE + 20)
 
 
 def workers_of(folder: Path) -> list[int]:
@@ -239,8 +239,8 @@ def test_an_interrupted_bake_leaves_no_worker_and_goes_on(
             "command goes on with it\n"
         )
         assert not workers_of(tmp_path)
-    # By themselves: nobody ends them.
-    until(lambda: not workers_of(tmp_path), 20)
+    # By themselves: nobody ends them. One that had not yet seen the bake alive waits for its silence.
+    until(lambda: not workers_of(tmp_path), SILENCE + 20)
     (spool / "go").unlink()
     before = {path: path.stat().st_mtime_ns for path in spool.glob("calls/*/*.result")}
     assert len(before) >= 2
