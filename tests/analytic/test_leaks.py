@@ -7,6 +7,7 @@ a wall, and where no chain of rays leads to a lamp the hierarchy's solution is n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +20,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight
 from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle, solid_box
-from tests.unit.texel_scenes import bake_scene
+from tests.unit.texel_scenes import bake_scene, in_cell
 
 ON_FLOOR = (1.03, 0.97, 0.0), (1.97, 2.11, 1.0)
 """Off every lattice of texels, over the floor's diagonal, and without a floor of its own."""
@@ -129,6 +130,29 @@ def test_nor_at_medium_quality(thickness: float, light: str) -> None:
 def test_nor_on_a_floor_without_a_lightmap(thickness: float, light: str) -> None:
     """Elements of the floor run on under the walls, and rays that hit it find no texels."""
     assert_sealed(sealed_box(*ON_FLOOR, thickness, light, floor_baked=False), "draft")
+
+
+def test_nor_where_kept_uvs_give_one_pixel_to_walls_inside_and_outside() -> None:
+    """One side of a flat box has no pixels but those that show the shell's top, which nothing touches."""
+    low, high = HANGING
+    scene = sealed_box(low, (*high[:2], low[2] + 0.05), 0.01, "lamp")
+    room, inner, shell = scene.objects
+    pixel = 1 / 64
+    wide = 18.6 * pixel
+    outside = [in_cell((x, y), (x + wide, y + wide)) for y in (0.0, 0.35) for x in (0.0, 0.35, 0.7)]
+    beside = in_cell((wide + 0.05 * pixel, 0.0), (19 * pixel, wide))
+    inside = [in_cell((x, 0.7), (x + wide, 0.7 + wide)) for x in (0.0, 0.35)]
+    narrow = [in_cell((0.7, y), (0.7 + wide, y + pixel)) for y in 0.7 + 0.02 * np.arange(9)]
+    uvs = (
+        np.concatenate(narrow[:6]),
+        np.concatenate([*inside, beside, *narrow[6:]]),
+        np.concatenate([outside[number] for number in (1, 0, 2, 3, 4, 5)]),
+    )
+    objects = tuple(replace(item, uv=uv) for item, uv in zip((room, inner, shell), uvs, strict=True))
+    result = bake(replace(scene, objects=objects), BakeSettings(quality="draft", resolution=64))
+    page = result.pages[0].pixels
+    assert page[1:18, 1:18].min() > 0.01
+    assert not page[45:63, 1:40].any()
 
 
 def test_a_wall_across_surfaces_without_lightmaps_makes_two_rooms() -> None:

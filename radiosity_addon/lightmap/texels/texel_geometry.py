@@ -188,6 +188,13 @@ class TexelGeometry:
             reach[rows] = 2.0 * farthest
         return reach
 
+    def holds(self, texel: Array, points: Array) -> Array:
+        """Return (h,) whether points (h, 3) are no farther from texels than one of theirs can be."""
+        across, up = self._texel_edges(self.triangle[texel])
+        reach = np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1)
+        near = np.linalg.norm(points - self.position[texel], axis=1) <= reach
+        return np.asarray(near | self.is_shared(texel))
+
     def on(self, scene: Scene) -> TexelGeometry:
         """Return the same texels over a scene whose triangles have moved."""
         rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]

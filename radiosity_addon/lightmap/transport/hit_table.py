@@ -55,6 +55,7 @@ class HitTable:
         """Return (h,) int32 the numbers of hits: of their texel, if it can answer."""
         geometry, elements = self.geometry, self.local.elements
         texel = geometry.texel_at(hits)
+        texel[self._of_others(texel, hits)] = NO_TEXEL
         found = texel.copy()
         there = texel != NO_TEXEL
         divided = np.flatnonzero(there & self._in_cells[texel])
@@ -81,6 +82,30 @@ class HitTable:
         cell = self.element_cells.at(elements.leaves_of(hits), hits)
         found[elsewhere] = np.where(cell == NOTHING, NOTHING, cell + self.texel_count)
         return found
+
+    def _of_others(self, texel: Array, hits: Hits) -> Array:
+        """Return the rows of hits whose texel shows another surface.
+
+        Facets of one surface may share a pixel, and so may charts of kept UVs whose surfaces are far apart.
+        A hit has to be as near to its texel as a texel is wide, and see it, over the edge between them if
+        it lies behind the texel's plane.
+        """
+        geometry, caster = self.geometry, self.local.caster
+        rows = np.flatnonzero((texel != NO_TEXEL) & (hits.triangle != geometry.triangle[texel]))
+        rows = rows[~geometry.is_shared(texel[rows])]
+        hits, texel = hits.take(rows), texel[rows]
+        position, center = geometry.positions_of(hits), geometry.position[texel]
+        normal = geometry.surface_normal[texel]
+        near = geometry.holds(texel, position)
+        behind = np.einsum("hk,hk->h", center - position, normal)
+        lift = SIGHT_LIFT * caster.surface_offset
+        bent = np.flatnonzero(near & (np.abs(behind) > lift))
+        start = position[bent] + lift * geometry.face_normals[hits.triangle[bent]]
+        over = start + np.maximum(behind[bent], 0.0)[:, None] * normal[bent]
+        seen = free_segment(caster, start, over)
+        seen &= free_segment(caster, over, center[bent] + lift * normal[bent])
+        near[bent] = seen
+        return np.asarray(rows[~near])
 
     def _without_cell(self, texel: Array, hits: Hits) -> Array:
         """Return (h,) what answers hits on texels without a cell for them: NO_TEXEL, thus an element.
