@@ -59,7 +59,7 @@ def store_prepared(spool: Spool, inputs: BakeInputs, prepared: PreparedBake) -> 
     with explained(spool.path), suppress(FileNotFoundError):
         (spool.path / FINISHED).unlink()
     replace(prepared, inputs=digest).write(spool)
-    if has_result(spool, digest):
+    if StoredResult.is_whole(spool, digest, inputs.bake_scene, inputs.settings):
         return False
     spool.reopen()
     return True

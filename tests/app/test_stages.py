@@ -168,6 +168,10 @@ def test_a_result_is_kept_if_it_is_whole_and_else_found_again(
             assert finish(scene, spool, tmp_path / "out") == 1
             assert "is damaged: run the bake again" in capsys.readouterr().err
             assert not (tmp_path / "out" / "report.json").exists()
+        assert prepare(scene, spool, options) == 0
+        assert capsys.readouterr().out.endswith(
+            "its result is there already: finish it\n" if harm == "none" else ": run it\n"
+        )
         assert run_command(["run", str(spool)]) == 0
         assert ("already: there is nothing to run" in capsys.readouterr().out) == (harm == "none")
         assert (result.stat().st_mtime_ns == written) == (harm == "none")
@@ -237,6 +241,10 @@ def test_a_bake_is_finished_once(scene: Path, tmp_path: Path, capsys: pytest.Cap
     capsys.readouterr()
     assert finish(scene, spool, tmp_path / "other") == 1
     assert capsys.readouterr().err.count("\n") == 1
+    (tmp_path / "out" / "report.json").rename(tmp_path / "report.json")
+    assert finish(scene, spool, tmp_path / "out") == 1
+    assert "where no report.json is any more" in capsys.readouterr().err
+    (tmp_path / "report.json").rename(tmp_path / "out" / "report.json")
     # And can be prepared again, or baked in at once.
     in_stages(scene, spool, tmp_path / "other", SMALL)
     assert lightmaps(tmp_path / "out") == lightmaps(tmp_path / "other")
@@ -289,6 +297,22 @@ def test_folders_of_others_are_left_alone(
     assert run(tmp_path / "spool") == 1
     assert finish(scene, tmp_path / "spool", tmp_path / "out") == 1
     assert capsys.readouterr().err.count("is no spool") == 2
+
+
+@pytest.mark.parametrize("harm", ["removed", "truncated"])
+def test_a_spool_without_its_record_is_named(
+    harm: str, scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spool = tmp_path / "spool"
+    assert prepare(scene, spool, SMALL) == 0
+    record = spool / "spool.json"
+    record.unlink() if harm == "removed" else record.write_bytes(record.read_bytes()[:-5])
+    capsys.readouterr()
+    assert finish(scene, spool, tmp_path / "out") == 1
+    assert run(spool) == 1
+    what = "gone" if harm == "removed" else "damaged"
+    said = f"error: '{record}' is {what}: start or prepare the bake again, in an empty folder\n"
+    assert capsys.readouterr().err == 2 * said
 
 
 def test_what_others_put_into_a_spool_stays(scene: Path, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from ...farm import (
     spool_to_prepare,
     store_prepared,
 )
+from ...files import REPORT_NAME
 from ...options import BakeSettings, Form
 from ..exporting.shown_lightmaps import refuse_quantity
 from ..jobs.job import prepare_bake
@@ -105,6 +106,11 @@ def finish(
     if into is not None:
         if into != output.expanduser().resolve():
             raise BakeError(f"'{ready.path}' was finished into '{into}': prepare and run the bake again")
+        if not (into / REPORT_NAME).is_file():
+            raise BakeError(
+                f"'{ready.path}' was finished into '{into}', where no {REPORT_NAME} is any more: "
+                "prepare and run the bake again"
+            )
         say_finished(ready, output)  # which may have been interrupted
         console.lines([f"'{ready.path}' was finished into '{into}' already: there is nothing left to do"])
         return
