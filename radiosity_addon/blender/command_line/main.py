@@ -154,6 +154,7 @@ def _bake(
     interrupts: Interrupts,
 ) -> None:
     """Bake or relight, and export if that is wanted too."""
+    from ...bake import KeepOptions
     from . import verbs
 
     scene, output, preview = request.scene, request.output, not request.no_preview
@@ -170,12 +171,11 @@ def _bake(
             settings,
             request.report,
             request.plot,
-            request.keep,
+            KeepOptions(sidecar=True) if request.keep else None,
             *of_all,
             preview=preview,
             form=form,
-            spool=request.spool,
-            farm=request.farm,
+            baking=verbs.shared_with(output, request.spool, request.farm),
         )
     after_bake(output, form, *of_all)
 

@@ -118,7 +118,7 @@ def finish(
     stored = result_in(ready, prepared)
     keeping = KeepOptions(sidecar=True, mark=stored.mark or KeepOptions().mark) if prepared.keep else None
     with finishing(ready, prepared, stored, output) as baking:
-        verbs.bake_with(
+        verbs.bake(
             scene,
             loaded,
             output,

@@ -43,51 +43,6 @@ def bake(
     settings: BakeSettings,
     report_copy: Path | None,
     plot: Path | None,
-    keep: bool,
-    allowed: Permissions,
-    console: Console,
-    interrupts: Interrupts,
-    *,
-    preview: bool = True,
-    form: Form | None = None,
-    spool: Path | None = None,
-    farm: FarmSpec | None = None,
-) -> None:
-    """Bake as `bake_with` does, with the pipeline or what of it is shared.
-
-    Parameters
-    ----------
-    keep : bool
-        Whether a sidecar is written, by which the bake can be relit.
-    spool : Path or None
-        The folder through which workers share the bake.
-    farm : FarmSpec or None
-        Workers that are started for it.
-    """
-    bake_with(
-        scene,
-        loaded,
-        output,
-        settings,
-        report_copy,
-        plot,
-        KeepOptions(sidecar=True) if keep else None,
-        allowed,
-        console,
-        interrupts,
-        preview=preview,
-        form=form,
-        baking=_shared_with(output, spool, farm),
-    )
-
-
-def bake_with(
-    scene: Path | None,
-    loaded: Path | None,
-    output: Path,
-    settings: BakeSettings,
-    report_copy: Path | None,
-    plot: Path | None,
     keeping: KeepOptions | None,
     allowed: Permissions,
     console: Console,
@@ -156,7 +111,7 @@ def bake_with(
 
 
 @contextmanager
-def _shared_with(output: Path, spool: Path | None, farm: FarmSpec | None) -> Iterator[Baking | None]:
+def shared_with(output: Path, spool: Path | None, farm: FarmSpec | None) -> Iterator[Baking | None]:
     """Yield the pipeline shared through a spool if one is given or workers are, else None."""
     if spool is None and farm is None:
         yield None
