@@ -33,7 +33,8 @@ FINE = 3.0
 """What is not wider than this many texels answers as a whole, …"""
 
 FINEST = 0.75
-"""… but for rays that are shorter than a part of its width: those ask cells down to this width, …"""
+"""… but for rays that are shorter than a part of its width: those ask cells down to this width, if it is
+wider, …"""
 
 NEAR = 0.5
 """… which is this part."""
@@ -103,7 +104,8 @@ class ElementCells:
         large = self._is_large(leaf)
         level = np.where(large, self._enough[leaf], 0)
         # What is close to a ray's start is as wide for it as many texels are from afar.
-        near = large & (hits.distance < NEAR * self._size[leaf] / 4.0**level)
+        near = self._size[leaf] > FINEST * self._finest
+        near &= hits.distance < NEAR * self._size[leaf] / 4.0**level
         level[near] = self._depth[leaf[near]]
         whole = np.flatnonzero(level == 0)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[whole]] + self._lift(normal[whole])
