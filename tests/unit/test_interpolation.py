@@ -7,7 +7,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.points.interpolation import GatherPoints, Interpolation, fit, linear_weights
+from radiosity_addon.lightmap.points.interpolation import (
+    BESIDE,
+    GatherPoints,
+    Interpolation,
+    fit,
+    linear_weights,
+)
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.embree import EmbreeCaster
 from tests.rooms import gray_scene, rectangle, sphere
@@ -173,6 +179,19 @@ def test_support_falls_with_distance_and_closeness() -> None:
     assert supports[0][3] > supports[1][3] > supports[2][3]
 
 
+@pytest.mark.parametrize("away", [1, 2, 3])
+def test_one_row_of_points_supports_what_lies_beside_it_less(away: int) -> None:
+    """Between two rows all weights count, beside one of them a part by its distance in texels."""
+    geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
+    texel = geometry.index[0][12:13, 4]
+    for rows, part in (([12 - away, 12 + away], 1.0), ([12 + away], 1 / (1 + (away / BESIDE) ** 2))):
+        points = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
+        chosen = geometry.index[0][rows, 4]
+        points.add(4, chosen, np.full(len(chosen), 0.2))
+        _, _, weight = points.weighed(texel)
+        np.testing.assert_allclose(points.support(texel), part * weight.sum(), rtol=1e-5)
+
+
 def test_a_point_near_something_listens_no_farther_than_it_speaks() -> None:
     """What stands close to a point takes part of its view; points in the open do not know."""
     geometry = geometry_of(PLANE)
@@ -203,7 +222,7 @@ def test_a_point_does_not_speak_for_texels_whose_neighbors_see_things_near() -> 
 
     beside, away = (geometry.column == 1) & (geometry.row % 4 != 0), geometry.column == 16
     alone, together = support(5.0), support(0.01)
-    assert alone[beside].min() > 1.0
+    assert alone[beside].min() > 0.0
     # A texel is 1 / 24 wide. In the next column the reach is 0.35 (0.01 + 1 / 24): no point is so near.
     assert together[beside].max() == 0.0
     np.testing.assert_allclose(together[away], alone[away])

@@ -32,6 +32,10 @@ SLOPE_DAMPING = 0.05
 STEEPEST = 2.0
 """How far a slope may lower a point's weight, as a multiple of it."""
 
+BESIDE = 0.7
+"""Points that lie on one side of a texel, so many texels away in the mean, support it half as much as points
+around it: a strip with but one row of points would look alike all across."""
+
 CHUNK = 1 << 13
 """Texels whose neighbors are weighed at once; bounds the temporaries to some 40 MB a thread."""
 
@@ -205,8 +209,22 @@ def _supported(
     weight = points.kernel(texels[row], point, farthest[row])
     total = np.bincount(row, weight, minlength=len(texels))
     reached = np.flatnonzero(weight)
+    away = _beside(points, texels, row[reached], point[reached], weight[reached], total)
+    total = total / (1.0 + (away / BESIDE) ** 2)
     # In single precision: they are kept for all texels.
     return total, farthest, (texels[row[reached]], point[reached], weight[reached].astype(np.float32))
+
+
+def _beside(
+    points: GatherPoints, texels: Array, row: Array, point: Array, weight: Array, total: Array
+) -> Array:
+    """Return (r,) how many texels away the weighted mean of the points around each texel is."""
+    geometry = points._geometry
+    along = geometry.position.take(points.texel[point], axis=0) - geometry.position.take(texels[row], axis=0)
+    along *= weight[:, None]
+    sums = [np.bincount(row, along[:, axis], minlength=len(texels)) for axis in range(3)]
+    away = np.linalg.norm(sums, axis=0) / np.maximum(total, 1e-12)
+    return np.asarray(away / np.sqrt(geometry.texel_area[geometry.triangle[texels]]))
 
 
 @dataclass(frozen=True)
