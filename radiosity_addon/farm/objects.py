@@ -275,14 +275,18 @@ def _is_unsafe(what: type | FunctionType) -> bool:
 
 
 def state_of(value: Any) -> Any:
-    """Return what an object is made of again; cached properties are found again when they are asked for."""
+    """Return what an object is made of again; cached properties are found again when they are asked for.
+
+    Times that it keeps (`TIMES`) stay here: with them the same work would be another one after a restart.
+    """
     kind: Any = type(value)
     if "__getstate__" in _inherited(kind):
         return value.__getstate__()
     slots = [name for each in kind.__mro__ for name in getattr(each, "__slots__", ()) if hasattr(value, name)]
     state = {**{name: getattr(value, name) for name in slots}, **getattr(value, "__dict__", {})}
     is_cached = {name for name in state if isinstance(getattr(kind, name, None), cached_property)}
-    return {name: part for name, part in state.items() if name not in is_cached}
+    left_out = is_cached | set(getattr(kind, "TIMES", ()))
+    return {name: part for name, part in state.items() if name not in left_out}
 
 
 def restore_state(value: Any, state: Any) -> None:

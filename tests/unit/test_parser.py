@@ -32,6 +32,7 @@ def verbs(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     options.clear()
     stand_in = ModuleType(VERBS)
     stand_in.bake = lambda *args, **more: calls.append(("bake", *args)) or options.append(more)
+    stand_in.shared_with = lambda *given: given
     stand_in.restore = lambda *args: calls.append(("restore", *args))
     monkeypatch.setitem(sys.modules, VERBS, stand_in)
     monkeypatch.setattr(command_line, "verbs", stand_in, raising=False)
@@ -94,7 +95,7 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
     assert main(line.split()) == 0
     (_, scene, _, output, settings, report, plot, keep, allowed, console, _) = verbs[0]
     assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
-    assert (report, plot, keep) == (Path("r.json"), Path("p.SVG"), False)
+    assert (report, plot, keep) == (Path("r.json"), Path("p.SVG"), None)
     assert allowed == Permissions(overwrite=True, scripts=True)
     assert settings == BakeSettings(
         texel_density=12.5,
@@ -124,7 +125,7 @@ def test_a_bake_has_a_preview_unless_it_is_declined(verbs: list[tuple]) -> None:
 
 def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bake", "--keep"]) == 0
-    assert verbs[0][-4] is True
+    assert verbs[0][-4].sidecar
     assert verbs[0][-3] == Permissions()
     for line, message in (
         ("--keep --method shooting", "needs the hierarchical method"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,9 @@ class SolverState:
 
     All arrays over elements have a row for inner elements too: their area means.
     """
+
+    TIMES: ClassVar = ("history", "started")
+    """What tells of times: two runs of the same work differ in it alone."""
 
     scene: Scene
     settings: SolverSettings
