@@ -151,9 +151,10 @@ class GatherPoints:
         return np.asarray(result)
 
     def support(self, texels: Array, progress: Progress = SILENT) -> Array:
-        """Return (n,) the summed weights around texels: below 1 they need a point of their own.
+        """Return (n,) the summed weights around texels, less of points on one side (`BESIDE`).
 
-        From then on no point speaks for them that lies farther off than their neighbors allow.
+        Below 1 they need a point of their own. From then on no point speaks for them that lies farther
+        off than their neighbors allow.
         """
         scratch = self._geometry.scratch
         total = scratch.empty(len(texels))

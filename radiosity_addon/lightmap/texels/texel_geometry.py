@@ -189,11 +189,10 @@ class TexelGeometry:
         return reach
 
     def holds(self, texel: Array, points: Array) -> Array:
-        """Return (h,) whether points (h, 3) are no farther from texels than one of theirs can be."""
+        """Return (h,) whether points (h, 3) are as near to texels, which are not shared, as theirs are."""
         across, up = self._texel_edges(self.triangle[texel])
         reach = np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1)
-        near = np.linalg.norm(points - self.position[texel], axis=1) <= reach
-        return np.asarray(near | self.is_shared(texel))
+        return np.asarray(np.linalg.norm(points - self.position[texel], axis=1) <= reach)
 
     def on(self, scene: Scene) -> TexelGeometry:
         """Return the same texels over a scene whose triangles have moved."""
