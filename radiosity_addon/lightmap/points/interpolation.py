@@ -32,7 +32,7 @@ SLOPE_DAMPING = 0.05
 STEEPEST = 2.0
 """How far a slope may lower a point's weight, as a multiple of it."""
 
-BESIDE = 0.7
+BESIDE = 1.0
 """Points that lie on one side of a texel, so many texels away in the mean, support it half as much as points
 around it: a strip with but one row of points would look alike all across."""
 
@@ -221,9 +221,13 @@ def _beside(
 ) -> Array:
     """Return (r,) how many texels away the weighted mean of the points around each texel is."""
     geometry = points._geometry
-    along = geometry.position.take(points.texel[point], axis=0) - geometry.position.take(texels[row], axis=0)
-    along *= weight[:, None]
-    sums = [np.bincount(row, along[:, axis], minlength=len(texels)) for axis in range(3)]
+    start, end, sums = texels[row], points.texel[point], []
+    for axis in range(3):
+        place = geometry.position[:, axis]
+        along = place.take(end)
+        along -= place.take(start)
+        along *= weight
+        sums.append(np.bincount(row, along, minlength=len(texels)))
     away = np.linalg.norm(sums, axis=0) / np.maximum(total, 1e-12)
     return np.asarray(away / np.sqrt(geometry.texel_area[geometry.triangle[texels]]))
 
