@@ -146,7 +146,7 @@ class Spool(SpoolStore):
         """Refuse what is no spool, or one of another program: its bytes would differ."""
         path, record = self.path / RECORD, self._record()
         if record is None:
-            if path.exists() or any((self.path / name).is_dir() for name in _FOLDERS):
+            if path.exists() or all((self.path / name).is_dir() for name in _FOLDERS):
                 what = "damaged" if path.exists() else "gone"
                 raise BakeError(f"'{path}' is {what}: start or prepare the bake again, in an empty folder")
             raise BakeError(f"'{self.path}' is no spool; start the bake first, with --spool")
