@@ -78,6 +78,9 @@ LAMPS_PER_RAY = 16
 """More lamps than so many for each shadow ray of one are grouped, or share rays if they are kept apart: alone
 each asks two rays at least, together they ask 64 times as many as one where most of them disagree."""
 
+RAYS_OF_MANY = 2
+"""Times as many gather rays where many lamps are kept: few meet what one of them makes bright."""
+
 PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
 
@@ -321,6 +324,8 @@ def _texel_values(
         most = LAMPS_PER_RAY * quality_of(settings).solver.shadow_rays
         relightable = solution.relightable(bake_scene.emitter, bake_scene.scene.lights, most)
     local = solution.local_pass if relightable is None else relightable.local
+    if local.direct.many:
+        gather = replace(gather, rays=RAYS_OF_MANY * gather.rays)
     if settings.relative_error is None:
         light = light_texels(bake_scene.scene, local, geometry, gather, so_far=so_far, progress=progress)
     else:
