@@ -139,7 +139,7 @@ def _bake(
         solution = solve_scene(bake_scene, quality.solver, solving)
     lighting.stage("light", 0.0, 1.0).at(0.0)
     give_back()
-    is_shown = share_out_memory(geometry, settings, keep)
+    is_shown = share_out_memory(geometry, settings, keep, solution.n_elements)
     with timed(seconds, "light"):
         so_far = LightSoFar() if is_shown and len(geometry) <= MOST_SHOWN else None
         look = None if so_far is None else TexelPictures(so_far).next

@@ -20,6 +20,10 @@ from ..solver.settings import SolverSettings
 LIT_BYTES = 48.0
 """Of every texel while it is lit: its number, its light, what geometry does to it, which rays it needs."""
 
+ELEMENT_BYTES = 330.0
+"""Of every element while texels are lit: what is known of each of its cells, and the light of those that rays
+meet. A tree's leaves have eighty cells each, of which rays meet six."""
+
 IMAGE_BYTES, COPY_BYTES = 16.0, 16.0
 """Of every pixel of an image in Blender, and of the copy that it is made from, one image at a time."""
 
@@ -100,15 +104,16 @@ def texel_scratch(pages: Sequence[int], settings: BakeSettings) -> Scratch:
     return Scratch(max(BEFORE_SOLVING * free, 0.0))
 
 
-def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool) -> bool:
+def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool, elements: int) -> bool:
     """Give the texels' arrays what the scene, the solution and the least leave of the memory limit.
 
-    If the bake is kept, its arrays are still there when the images are made.
+    keep: Its arrays are still there when the images are made.
+    elements: Of the solution, of all levels.
 
     Returns shown: Whether what is left suffices to show the texels while they are lit.
     """
     scratch, pages = geometry.scratch, [len(numbers) for numbers in geometry.index]
-    floor = LIT_BYTES * len(geometry) + working_bytes(settings)
+    floor = LIT_BYTES * len(geometry) + ELEMENT_BYTES * elements + working_bytes(settings)
     if keep:
         floor = max(floor, least_bytes(pages, settings))
     most, showing = memory_limit(settings) - floor, SHOWN_BYTES * len(geometry)

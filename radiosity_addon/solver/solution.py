@@ -122,6 +122,11 @@ class Solution:
         return record_links(self._state)
 
     @property
+    def n_elements(self) -> int:
+        """How many elements there are, of all levels."""
+        return self._state.hierarchy.n_elements
+
+    @property
     def element_residual(self) -> Residual:
         """The residual of the elements' radiosity."""
         return Residual(self._state)

@@ -282,3 +282,37 @@ def test_the_threads_change_no_texel() -> None:
     values = np.random.default_rng(3).random((int(spread.point.max()) + 1, 3))
     for threads in (2, 3):
         np.testing.assert_array_equal(spread(values, threads), spread(values, 1))
+
+
+def test_texels_of_different_widths_find_their_own_points() -> None:
+    """A board next to a ground whose texels are 16 times as wide, and most of all."""
+    width = 1.0 / 24.0
+    board = rectangle((0, 0, 1), (1, 0, 0), (0, 1, 0))
+    ground = rectangle((0, 0, 0), (36 * 16 * width, 0, 0), (0, 60 * 16 * width, 0))
+    on_page = in_cell((0, 0), (24 / 64, 24 / 64))
+    both = np.concatenate([on_page, in_cell((28 / 64, 4 / 64), (1, 1))])
+    alone = texel_geometry(gray_scene(board), on_page, 64)
+    together = texel_geometry(gray_scene(np.concatenate([board, ground])), both, 64)
+    assert together.texel_size == pytest.approx(16 * width, rel=1e-3)
+    chosen = [points_of(geometry, 4, 2, 1).texel for geometry in (alone, together)]
+    of_board = chosen[1][together.triangle[chosen[1]] < 2]
+    assert len(chosen[0]) < 0.6 * len(alone)
+    np.testing.assert_array_equal(alone.row[chosen[0]], together.row[of_board])
+    np.testing.assert_array_equal(alone.column[chosen[0]], together.column[of_board])
+
+
+def test_what_is_close_to_a_hidden_wall_is_not_close_to_the_board_before_it() -> None:
+    """A wall 3 cm behind a board sees the board's back; the board looks into the open."""
+    board = rectangle((0, 0, 0.03), (1, 0, 0), (0, 1, 0))
+    wall = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    uv = np.concatenate([in_cell((0, 0), (0.5, 1)), in_cell((0.5, 0), (1, 1))])
+    supports = []
+    for of_wall in (0.5, 1.0 / 0.02):
+        geometry = geometry_of(board, wall, uv=uv)
+        points = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
+        chosen = np.flatnonzero((geometry.row % 4 == 0) & (geometry.column % 4 == 0)).astype(np.int32)
+        points.add(4, chosen, np.where(geometry.triangle[chosen] < 2, 0.5, of_wall))
+        of_board = np.setdiff1d(np.flatnonzero(geometry.triangle < 2), chosen)
+        supports.append(points.support(of_board))
+    assert supports[0].min() > 0
+    np.testing.assert_array_equal(*supports)

@@ -131,7 +131,7 @@ def test_points_are_put_into_cells_tile_by_tile(in_files: Scratch) -> None:
     position[:], normal[:] = random.uniform(0, 10, position.shape), UP
     rows = np.arange(0, COUNT, 2)
     with bytes_taken() as taken:
-        PointGrid(position, normal, rows, 0, 0.1, in_files)
+        PointGrid(position, normal, rows, np.zeros(len(rows), dtype=np.int64), 0, 0.1, in_files)
     # Numbers in order take 8 bytes, to be sorted half as much; tiles of 65,536 points some 8 MB.
     assert taken[0] < 16 * len(rows) + 12e6
 

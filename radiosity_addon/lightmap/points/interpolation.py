@@ -32,7 +32,7 @@ SLOPE_DAMPING = 0.05
 STEEPEST = 2.0
 """How far a slope may lower a point's weight, as a multiple of it."""
 
-BESIDE = 1.0
+BESIDE = 0.7
 """Points that lie on one side of a texel, so many texels away in the mean, support it half as much as points
 around it: a strip with but one row of points would look alike all across."""
 
@@ -75,7 +75,8 @@ class GatherPoints:
         geometry = self._geometry
         numbers = len(self) + np.arange(len(texel), dtype=np.int32)
         size = max(stride, 1.5) * geometry.texel_size
-        grid = PointGrid(geometry.position, geometry.normal, texel, len(self), size, geometry.scratch)
+        scale = geometry.scale[geometry.triangle[texel]]
+        grid = PointGrid(geometry.position, geometry.normal, texel, scale, len(self), size, geometry.scratch)
         self._grids.append(grid)
         self._number[texel] = numbers
         level = np.full(len(texel), len(self._grids) - 1, dtype=np.int8)
@@ -89,8 +90,9 @@ class GatherPoints:
         In the world, not on the page: the next chart or object goes on where one ends.
         """
         position, normal = self._geometry.position[texels], self._geometry.normal[texels]
-        grids = self._grids[level:]
-        near = [np.full((len(texels), 0), NONE, np.int32)] + [grid.near(position, normal) for grid in grids]
+        scale, grids = self._geometry.scale[self._geometry.triangle[texels]], self._grids[level:]
+        near = [np.full((len(texels), 0), NONE, np.int32)]
+        near += [grid.near(position, normal, scale) for grid in grids]
         found = np.concatenate(near, axis=1)
         # Its own point each texel has, should others crowd it out of its cell.
         own = self._number[texels]
@@ -99,10 +101,13 @@ class GatherPoints:
         row, column = np.nonzero(found != NONE)
         return row, found[row, column]
 
-    def kernel(self, texels: Array, point: Array, farthest: Array | None = None) -> Array:
+    def kernel(
+        self, texels: Array, point: Array, farthest: Array | None = None, seen: Array | None = None
+    ) -> Array:
         """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach.
 
         farthest (p,): Of the texels; None for what is known of them.
+        seen (p,) bool: Whether the points see the texels; None if that is to be found out.
         """
         farthest = self.farthest.take(texels) if farthest is None else farthest
         geometry = self._geometry
@@ -115,22 +120,27 @@ class GatherPoints:
         apart = self._alone.take(points_texel) | self._alone.take(texels)
         weight = np.where(points_texel == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
         row = np.flatnonzero((points_texel != texels) & (change < REACH) & ~apart)
-        start, end = texels.take(row), points_texel.take(row)
-        normal, end_normal = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
-        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, end_normal), 0.0))
+        bend = _bend(geometry, texels.take(row), points_texel.take(row))
         spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
+        row, spoken = row[spoken > 0], spoken[spoken > 0]
+        free = self.sees(texels.take(row), point.take(row)) if seen is None else seen[row]
+        weight[row] = spoken * free
+        return np.asarray(weight)
+
+    def sees(self, texels: Array, point: Array) -> Array:
+        """Return (p,) bool: whether nothing is between gather points and texels (p,), pair by pair."""
+        geometry, end = self._geometry, self.texel.take(point)
+        normal, end_normal = geometry.normal.take(texels, axis=0), geometry.normal.take(end, axis=0)
+        along = geometry.position.take(end, axis=0) - geometry.position.take(texels, axis=0)
+        distance = np.sqrt(np.einsum("pk,pk->p", along, along))
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
-        lift = SIGHT_LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
-        begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
-        directions = along.take(row, axis=0) + lift[:, None] * (end_normal - normal)
-        length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
-        directions /= np.maximum(length, 1e-300)[:, None]
-        heard = spoken > 0
-        weight[row[heard]] = spoken[heard] * self._caster.unoccluded(
-            begin[heard], directions[heard], length[heard]
-        )
-        return np.asarray(weight)
+        lift = SIGHT_LIFT * self._caster.surface_offset + SAGITTA * distance * _bend(geometry, texels, end)
+        begin = geometry.position.take(texels, axis=0) + lift[:, None] * normal
+        along += lift[:, None] * (end_normal - normal)
+        length = np.sqrt(np.einsum("pk,pk->p", along, along))
+        along /= np.maximum(length, 1e-300)[:, None]
+        return self._caster.unoccluded(begin, along, length)
 
     def _own_closeness(self, texels: Array, farthest: Array) -> Array:
         """Return (p,) what texels that are points see themselves; elsewhere what their neighbors expect."""
@@ -140,7 +150,10 @@ class GatherPoints:
         return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), 1.0 / farthest)
 
     def clamped(self, texels: Array, row: Array, point: Array) -> Array:
-        """Return (n,) how far things are from texels, by what points (p,) around them, sorted by row, see."""
+        """Return (n,) how far things are from texels, by what points (p,), sorted by row, see that see them.
+
+        What is close to others, in the gap behind a board, say, is not close to the board's front.
+        """
         geometry, result = self._geometry, self.farthest[texels]
         along = geometry.position[self.texel[point]] - geometry.position[texels[row]]
         farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
@@ -206,14 +219,21 @@ def _supported(
     """Return (r,) summed weights around texels, how far things are, and pairs with weights above 0."""
     texels = texels[rows]
     row, point = points.pairs(texels)
-    farthest = points.clamped(texels, row, point)
-    weight = points.kernel(texels[row], point, farthest[row])
+    seen = points.sees(texels[row], point)
+    farthest = points.clamped(texels, row[seen], point[seen])
+    weight = points.kernel(texels[row], point, farthest[row], seen)
     total = np.bincount(row, weight, minlength=len(texels))
     reached = np.flatnonzero(weight)
     away = _beside(points, texels, row[reached], point[reached], weight[reached], total)
     total = total / (1.0 + (away / BESIDE) ** 2)
     # In single precision: they are kept for all texels.
     return total, farthest, (texels[row[reached]], point[reached], weight[reached].astype(np.float32))
+
+
+def _bend(geometry: TexelGeometry, one: Array, other: Array) -> Array:
+    """Return (p,) how much normals turn between texels (p,) each: about the angle, √(1 − cosine)."""
+    normal, end_normal = geometry.normal.take(one, axis=0), geometry.normal.take(other, axis=0)
+    return np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, end_normal), 0.0))
 
 
 def _beside(

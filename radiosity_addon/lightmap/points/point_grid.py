@@ -1,4 +1,8 @@
-"""Find points near a surface by hashing: a grid of cells over the world, one per way of facing."""
+"""Find points near a surface by hashing: grids of cells over the world, one per way of facing and per scale.
+
+Where texels are larger, points lie farther apart, and so cells are larger: cells of one size would hold
+hundreds of points of a finely mapped object next to a coarsely mapped ground, and hand out two of them.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,7 @@ NONE = -1
 
 _SPOTS = [(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
 _PRIMES = tuple(np.int64(8 * prime) for prime in (73856093, 19349663, 83492791))
+_SCALE_PRIME = np.int64(8 * 67867979)
 
 
 class PointGrid:
@@ -24,19 +29,28 @@ class PointGrid:
 
     position, normal (n, 3): Of surfaces on which the points lie.
     rows (p,) int: Which of these the points are.
+    scale (p,) int: Cells around points are 2^scale times as wide.
     first: What a look-up answers with for the first of them; the others follow.
-    size: Edge of the cells [m].
+    size: Edge of the cells of scale 0 [m].
     scratch: Makes the arrays.
     """
 
     def __init__(
-        self, position: Array, normal: Array, rows: Array, first: int, size: float, scratch: Scratch
+        self,
+        position: Array,
+        normal: Array,
+        rows: Array,
+        scale: Array,
+        first: int,
+        size: float,
+        scratch: Scratch,
     ) -> None:
         self._size = size
         keys = scratch.empty(len(rows), np.int64)
         for tile in tiles(len(rows), CHUNK):
-            point = rows[tile]
-            keys[tile] = _hash((position[point] / size).T) + _facing(normal[point])
+            point, scales = rows[tile], scale[tile]
+            place = position[point] / self._widths(scales)[:, None]
+            keys[tile] = _hash(place.T) + _facing(normal[point]) + _SCALE_PRIME * scales
         order = np.argsort(keys, kind="stable")
         # Looked up past its end, the last cell answers that it has no more.
         end = PER_CELL if len(rows) else 0
@@ -47,17 +61,17 @@ class PointGrid:
         if end:
             self._sorted[-end:], self._numbers[-end:] = keys[order[-1]], NONE
 
-    def near(self, position: Array, normal: Array) -> Array:
+    def near(self, position: Array, normal: Array, scale: Array) -> Array:
         """Return (n, 18) int32: points that face alike in the nine cells around, each once; NONE for none.
 
-        The cells are those under a 3 × 3 grid in the tangent plane.
+        The cells are those of a scale (n,) under a 3 × 3 grid in the tangent plane.
         """
         found = np.full((len(position), len(_SPOTS) * PER_CELL), NONE, dtype=np.int32)
         if not len(self._sorted):
             return found
         tangent, bitangent = (np.ascontiguousarray(axis.T) for axis in orthonormal_basis(normal))
-        middle = np.ascontiguousarray((position / self._size).T)
-        facing = _facing(normal)
+        middle = np.ascontiguousarray((position / self._widths(scale)[:, None]).T)
+        facing = _facing(normal) + _SCALE_PRIME * scale
         keys: list[Array] = []
         for spot, (i, j) in enumerate(_SPOTS):
             key = _hash(middle + i * tangent + j * bitangent) + facing
@@ -72,6 +86,9 @@ class PointGrid:
                     same &= ~again
                 found[:, spot * PER_CELL + which] = np.where(same, self._numbers.take(slot), NONE)
         return found
+
+    def _widths(self, scale: Array) -> Array:
+        return np.asarray(self._size * 2.0**scale)
 
 
 def _hash(place: Array) -> Array:

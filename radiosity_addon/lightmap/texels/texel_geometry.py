@@ -158,6 +158,13 @@ class TexelGeometry:
         return float(np.sqrt(self.texel_area[order[middle]].mean()))
 
     @cached_property
+    def scale(self) -> Array:
+        """(t,) int64: the power of two nearest to the width of each triangle's texels by the median one."""
+        width = np.sqrt(self.texel_area) / self.texel_size
+        known = np.isfinite(width) & (width > 0)
+        return np.round(np.log2(width, out=np.zeros(len(width)), where=known)).astype(np.int64)
+
+    @cached_property
     def counts(self) -> Array:
         """(t,) int64: how many texels each triangle has."""
         found = np.zeros(len(self.triangles), dtype=np.int64)

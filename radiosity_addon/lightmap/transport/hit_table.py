@@ -197,7 +197,7 @@ class TableRows:
     """Which number each row of a table of radiosity has: texels and elements their own, then small ones.
 
     first_small: The first row of a sub-cell or cell; all numbers below are rows.
-    small (s,) int64: The numbers of those that have a row, ascending. The others answer nothing.
+    small (s,) int32: The numbers of those that have a row, ascending. The others answer nothing.
     """
 
     def __init__(self, first_small: int, small: Array) -> None:

@@ -117,7 +117,7 @@ def over_rows(spread: Interpolation, runs: Array, scratch: Scratch) -> Interpola
     first = scratch.empty(len(spread.first), np.int64)
     row, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
     total = 0
-    for texels in tiles(len(spread.first)):
+    for texels in tiles(len(spread.first), CHUNK):
         entries = spread.entries_of(texels)
         count = runs[spread.point[entries]]
         start = np.append(0, np.cumsum(count))

@@ -163,10 +163,12 @@ def gather_sub_cells(
     made = gathering.links(rows, reflectance, progress.part(0.5, 1.0))
     for sources in (links.sources, links.aimed.sources):
         rows.to_rows(sources)
-    number = np.concatenate([np.arange(table.texel_count, table.first_small), small])
-    element = table.elements_of(number, below)
-    start = table.geometry.scratch.empty((len(element), 3))
-    for tile in tiles(len(element)):
+    del gathering
+    number = np.concatenate([np.arange(table.texel_count, table.first_small, dtype=np.int32), small])
+    start = table.geometry.scratch.empty((len(number), 3))
+    element = np.empty(len(number), dtype=np.int32)
+    for tile in tiles(len(number)):
+        element[tile] = table.elements_of(number[tile], below)
         start[tile] = table.local.elements.reflected_of(element[tile])
     return SubCells(start, made, element), rows
 
@@ -221,7 +223,11 @@ class _SubCellGather:
 
     def gather_new(self, progress: Progress) -> bool:
         """Gather from the cells that were met and have not gathered yet; return whether there were any."""
-        number = np.flatnonzero((self._met > 0) & ~self._gathered)
+        new = [
+            tile.start + np.flatnonzero((self._met[tile] > 0) & ~self._gathered[tile])
+            for tile in tiles(len(self._met))
+        ]
+        number = np.concatenate(new or [np.zeros(0, dtype=np.int64)])
         self._gathered[number] = True
         rays_of = self._rays(self._met[number])
         number += self._first
@@ -241,14 +247,15 @@ class _SubCellGather:
         return len(number) > 0
 
     def small(self) -> Array:
-        """Return (s,) int64, ascending: smaller cells of elements that were met, and of texels that gathered.
+        """Return (s,) int32, ascending: smaller cells of elements that were met, and of texels that gathered.
 
         Where nobody gathered, the hierarchy's values stand; a cell of a texel has none.
         """
         table = self._table
         first, first_cell = table.first_small - self._first, table.first_cell - self._first
         met = np.flatnonzero(self._met[first:first_cell]) + table.first_small
-        return np.concatenate([met, np.flatnonzero(self._gathered[first_cell:]) + table.first_cell])
+        of_texels = np.flatnonzero(self._gathered[first_cell:]) + table.first_cell
+        return np.concatenate([met, of_texels], dtype=np.int32, casting="same_kind")
 
     def links(self, rows: TableRows, reflectance: Array, progress: Progress) -> list[SubCellLinks]:
         """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""

@@ -182,7 +182,9 @@ def sweep(
     for rows in tiles(texel_count):
         table[rows] = start[rows]
     del start
-    table[texel_count:surfaces] = transport.cells.start
+    of_cells = table[texel_count:surfaces]
+    for rows in tiles(len(of_cells)):
+        of_cells[rows] = transport.cells.start[rows]
     reached = _reached(links, cells, direct, len(beyond))
     for rows in tiles(surfaces):
         table[rows][~reached[rows]] = 0.0

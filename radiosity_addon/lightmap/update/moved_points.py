@@ -92,8 +92,8 @@ def _unsure(standing: StandingHits, spread: Interpolation, closer: Array) -> Arr
     traced, moved, geometry = standing.previous.traced, standing.previous.affected, standing.table.geometry
     unsure = moved.texels | geometry.neighborhood(standing.divided) | spread.any_of(closer)
     # A texel's points are in cells next to its own, no wider than the coarsest lattice.
-    farthest = CELLS_ACROSS * max(*traced.settings.strides, 1.5) * geometry.texel_size
-    near = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))
+    farthest = CELLS_ACROSS * max(*traced.settings.strides, 1.5) * geometry.texel_size * 2.0**geometry.scale
+    near = np.flatnonzero(moved.boxes.near(geometry.position, farthest[geometry.triangle]))
     ends = np.append(spread.first, len(spread.point))
     count = ends[near + 1] - ends[near]
     texel = np.repeat(near, count)
