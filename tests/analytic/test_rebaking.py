@@ -15,12 +15,13 @@ from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.base.errors import SceneError
+from radiosity_addon.lightmap.transport.sub_cells import RAYS_OF_MET
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.moved_rooms import ELSEWHERE, PLACE, laid_out_as, room
-from tests.rooms import box_room, gray, gray_scene, solid_box
-from tests.unit.texel_scenes import bake_scene
+from tests.rooms import box_room, gray, gray_scene, rectangle, solid_box
+from tests.unit.texel_scenes import bake_scene, in_cell
 
 SETTINGS = BakeSettings(resolution=64, quality="draft", threads=1)
 
@@ -254,3 +255,33 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
         moved_objects(kept, replace(plain, objects=(plain.objects[0], mesh, plain.objects[2])))
     with pytest.raises(SceneError, match="nothing in it moved"):
         moved_objects(replace(kept, moves=None), plain)
+
+
+def hovering(height: float) -> BakeScene:
+    """A box so far above a floor with eight texels a side, and a lamp beside it."""
+    floor = rectangle((0, 0, 0), (3, 0, 0), (0, 3, 0))
+    box = solid_box((1, 1, height), (2, 2, height + 0.5))
+    of_floor = in_cell((0, 0), (8 / 64, 8 / 64))
+    corners = [(0.2 + 0.25 * (side % 3), 0.5 * (side // 3)) for side in range(6)]
+    of_box = np.concatenate([in_cell((u, v), (u + 0.2, v + 0.4)) for u, v in corners])
+    triangles = np.concatenate([floor, box])
+    lamp = PointLight((0.3, 0.3, 1.0), 50.0, name="Bulb")
+    scene = gray_scene(triangles, 0.7, lights=[lamp])
+    return bake_scene(scene, ("Floor", 2, of_floor), ("Box", 12, of_box))
+
+
+def test_cells_that_more_rays_meet_after_a_move_gather_with_more() -> None:
+    """Each with as many as the rays of texels that meet it ask for, as in a full bake."""
+    _, kept = bake_and_keep(hovering(1.5), replace(SETTINGS, keep_uvs=True))
+    _, after = bake_moved(kept, hovering(0.05))
+    transport = after.lit.transport
+    met = np.bincount(transport.links.sources[transport.links.sources >= 0])
+    checked = 0
+    for links in transport.cells.links:
+        often = np.append(met, np.zeros(links.rows.max() + 1, dtype=np.int64))[links.rows]
+        asked = np.zeros(len(often), dtype=np.int64)
+        for least, rays in RAYS_OF_MET:
+            asked[often >= least] = rays
+        assert (links.sources.shape[1] >= asked).all()
+        checked += int((asked == RAYS_OF_MET[-1][1]).sum())
+    assert checked > 10

@@ -23,7 +23,7 @@ from ..texels import NO_TEXEL, TexelGeometry
 PASSES = (1, 2, 4, 8, 16)
 """Steps that a texel may take, besides none."""
 
-RISK_PASSES = 4
+RISK_PASSES = 8
 """Means over 3 × 3 texels that the estimate of the squared error is averaged by."""
 
 APART, ALIKE, OFF_PLANE = 1.6, 0.9, 0.35

@@ -45,9 +45,7 @@ def with_more_rays(
         table.local, table.crossings, table.number, numbered, layout, factor, gathering
     )
     del numbered, aimed
-    cells, rows = gather_sub_cells(
-        table, links, below, transport.reflectance, cell_rays, known, of_cells, renew_coarse=True
-    )
+    cells, rows = gather_sub_cells(table, links, below, transport.reflectance, cell_rays, known, of_cells)
     return TexelTransport(links, cells, transport.reflectance), layout, rows
 
 

@@ -136,7 +136,6 @@ def gather_sub_cells(
     most_rays: int,
     known: Sequence[SubCellHits] = (),
     progress: Progress = SILENT,
-    renew_coarse: bool = False,
 ) -> tuple[SubCells, TableRows]:
     """Gather from the cells that links met, and from those that these met; return them, and all rows.
 
@@ -145,14 +144,13 @@ def gather_sub_cells(
     below (n,) int32: The leaf elements below the texels, or NOTHING.
     reflectance (n, 3): Of the texels.
     most_rays: No cell gathers with more.
-    known: Those that need not gather. Those that nothing meets are left out.
-    renew_coarse: Let known cells gather anew if links meet them so often that they should have more rays.
+    known: Those that need not gather, unless links meet them so often by now that they should have more rays.
+        Those that nothing meets are left out.
     """
     gathering = _SubCellGather(table, most_rays, known)
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
-    if renew_coarse:
-        gathering.forget_coarse()
+    gathering.forget_coarse()
     gathering.take_known()
     for _, turn in zip(range(ROUNDS), progress.part(0.0, 0.5).turns(0.5), strict=False):
         if not gathering.gather_new(turn):
