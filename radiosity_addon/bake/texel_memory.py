@@ -20,9 +20,9 @@ from ..solver.settings import SolverSettings
 LIT_BYTES = 48.0
 """Of every texel while it is lit: its number, its light, what geometry does to it, which rays it needs."""
 
-ELEMENT_BYTES = 330.0
+ELEMENT_BYTES = 480.0
 """Of every element while texels are lit: what is known of each of its cells, and the light of those that rays
-meet. A tree's leaves have eighty cells each, of which rays meet six."""
+meet. In foliage an element has forty cells, and rays meet twelve of them."""
 
 IMAGE_BYTES, COPY_BYTES = 16.0, 16.0
 """Of every pixel of an image in Blender, and of the copy that it is made from, one image at a time."""
