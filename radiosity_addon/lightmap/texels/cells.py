@@ -103,14 +103,14 @@ class TexelCells:
         foreign = (hits.triangle != geometry.triangle[texel]) & ~geometry.is_shared(texel)
         anchors, first = self._own_anchors[rank], np.where(foreign, OWN, 0)
         anchors[foreign] = _pixel_anchors(geometry, caster, texel[foreign])
-        order = np.zeros((len(texel), OWN), dtype=np.int8)
-        apart = anchors[waiting] - position[waiting, None]
-        order[waiting] = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        apart = anchors - position[:, None]
+        square = np.einsum("hkx,hkx->hk", apart, apart)
         below = self._below_hood(texel, geometry.positions_of(hits)[:, None])[:, 0]
-        for turn in range(OWN):
+        for _ in range(OWN):
             if len(waiting) == 0:
                 break
-            cell = order[waiting, turn]
+            cell = square[waiting].argmin(axis=1)
+            square[waiting, cell] = np.inf
             seen = self._below[rank[waiting], first[waiting] + cell] == below[waiting]
             alike = np.flatnonzero(seen)
             asking = waiting[alike]

@@ -158,17 +158,18 @@ class ElementCells:
         corners, path = self._cells_around(leaf, position, level - 1)
         anchors = _ANCHORS @ corners + lift[:, None]
         apart = anchors - position[:, None]
-        order = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        square = np.einsum("hkx,hkx->hk", apart, apart)
         number = self._first[leaf] + _STARTS[level - 1] + CELLS_PER_ELEMENT * path
         hooded = self._is_large(leaf)
         below = np.zeros(len(leaf), dtype=bool)
         below[hooded] = self.below_hood(position[hooded], normal[hooded])
         found = np.full(len(leaf), NOTHING, dtype=np.int32)
         waiting = every
-        for turn in range(CELLS_PER_ELEMENT):
+        for _ in range(CELLS_PER_ELEMENT):
             if len(waiting) == 0:
                 break
-            cell = order[waiting, turn]
+            cell = square[waiting].argmin(axis=1)
+            square[waiting, cell] = np.inf
             anchor = anchors[waiting, cell]
             seen = free_segment(self._caster, position[waiting], anchor)
             asked = np.flatnonzero(seen & hooded[waiting])
