@@ -50,6 +50,7 @@ from .sampling import (
 from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
 from .short_rows import across
 from .streams import LAMP_STEP, LIGHT_STEP, SHADOW_STEP, Stream
+from .taken_rows import TakenRows
 from .triangles import (
     WHOLE_TRIANGLE,
     double_area_vectors,
@@ -76,6 +77,7 @@ __all__ = [
     "Rows",
     "Scratch",
     "Stream",
+    "TakenRows",
     "TooLargeError",
     "TriangleTree",
     "across",

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...numerics import Array, Scratch, orthonormal_basis, tiles
+from ...numerics import Array, Scratch, TakenRows, orthonormal_basis, tiles
 from ...rays import Hits, surface_offset
 from ...scene import Scene
 from .rasterization import FOOTPRINT, Texels, sample_footprints
@@ -83,7 +83,6 @@ class TexelGeometry:
         self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
         self.triangle, self.whole = scratch.empty(count, np.int32), scratch.empty(count, np.bool_)
         self._inset, self._depth = _edge_inset(scene), SINK * surface_offset(scene.triangles)
-        self.surface_normal = scratch.empty((count, 3))
         self.barycentric = scratch.empty((count, 2), np.float32)
         self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
         for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
@@ -94,14 +93,20 @@ class TexelGeometry:
                 triangle = of[page.triangle[tile]]
                 self.page[texels_of_tile], self.triangle[texels_of_tile] = number, triangle
                 self.whole[texels_of_tile] = page.area[tile] >= 1.0
-                self.surface_normal[texels_of_tile] = scene.face_normals[triangle]
                 centroid = page.centroid[tile].astype(np.float64)
                 self._put(texels_of_tile, self._drawn_in(centroid[:, None], triangle)[:, 0])
+        self.surface_normal = TakenRows(scene.face_normals, self.triangle)
         self.shared = find_shared(scene, uv, page_of_triangle, self.index, self.triangle)
         if self.shared is not None:
             many = np.flatnonzero(self.shared.number >= 0)
             self.whole[many] = False
-            self.surface_normal[many], self.normal[many] = self.shared.facing, self.shared.shading
+            self.normal[many] = self.shared.shading
+            own = scratch.empty(count, np.int32)
+            for tile in tiles(count):
+                own[tile] = self.triangle[tile]
+            own[many] = len(scene.face_normals) + np.arange(len(many))
+            facing = np.concatenate([scene.face_normals, self.shared.facing])
+            self.surface_normal = TakenRows(facing, own)
 
     def _joined(self, texels: Sequence[Texels]) -> list[Texels]:
         """Put the pages' texels one after the other; return them as views of the whole."""
@@ -132,7 +137,8 @@ class TexelGeometry:
 
     def _put(self, rows: slice, weights: Array) -> None:
         """Move texels to barycentric weights (r, 3) of their triangles."""
-        triangle, upright = self.triangle[rows], self.surface_normal[rows]
+        triangle = self.triangle[rows]
+        upright = self.face_normals[triangle]
         self.barycentric[rows] = weights[:, 1:]
         self.position[rows] = self._sunk(triangle[:, None], _at(self.triangles[triangle], weights[:, None]))[
             :, 0

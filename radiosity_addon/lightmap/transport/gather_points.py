@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, marked, row_numbers, run_numbers, tiles
+from ...numerics import Array, TakenRows, marked, row_numbers, run_numbers, tiles
 from ...solver.gather import AimedRays, Footprints, GatheredHits, LocalPass, Resolver
 from ..points import GatherPoints, Interpolation, fit, refit
 from ..texels import Crossings, TexelGeometry
@@ -262,11 +262,11 @@ def gather_at(
 ) -> GatheredHits:
     """Gather at some texels, by one `run` (c,) of their rays. `into` takes sources and tints, if given."""
     at = gather_footprints(geometry, chosen, starts, run)
-    expected, upright = (geometry.scratch.empty((len(chosen), *shape)) for shape in ((), (3,)))
+    expected = geometry.scratch.empty(len(chosen))
     for tile in tiles(len(chosen), CHUNK):
         texels = chosen[tile]
         expected[tile] = local.elements.irradiance_at(geometry.triangle[texels], geometry.barycentric[texels])
-        upright[tile] = geometry.surface_normal[texels]
+    upright = TakenRows(geometry.surface_normal, chosen)
     return local.gather.at(at, upright, rays, resolve, expected, into, progress)
 
 
@@ -274,9 +274,7 @@ def gather_footprints(
     geometry: TexelGeometry, chosen: Array, starts: int | None, run: Array | None = None
 ) -> Footprints:
     """Return where texels gather, each from `starts` points, by one run (c,) of their rays."""
-    position, normal = (geometry.scratch.empty((len(chosen), 3)) for _ in range(2))
-    for tile in tiles(len(chosen)):
-        position[tile], normal[tile] = geometry.position[chosen[tile]], geometry.normal[chosen[tile]]
+    position, normal = TakenRows(geometry.position, chosen), TakenRows(geometry.normal, chosen)
     sampler = partial(sample_of, geometry, chosen)
     return Footprints(position, normal, chosen, sampler, starts=starts, runs=run, scratch=geometry.scratch)
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, tiles
+from ...numerics import Array, TakenRows, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood
@@ -161,7 +161,7 @@ class HitTable:
             return self.local.elements.reflectance_of(leaf)
         return np.asarray(of_texels[self.texel_cells.texel_of(self.texel_cell(number))])
 
-    def footprints(self, number: Array, of_element: bool) -> tuple[Footprints, Array]:
+    def footprints(self, number: Array, of_element: bool) -> tuple[Footprints, Array | TakenRows]:
         """Return where cells of elements, or of texels, gather, and (p, 3) the normals of their surfaces."""
         if of_element:
             at = self.element_cells.footprints(self.element_cell(number))

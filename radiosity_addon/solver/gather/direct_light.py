@@ -183,4 +183,5 @@ class DirectLight:
         channels = (3,) if self._state.caster.for_lamps.tinted else ()
         chosen = [lamps[row][1] for row in order]
         runs = min(RUNS * rays, MOST_RUNS)
-        return RunGains(points.points, points.normals, chosen, numbers, runs, channels)
+        at, normals = np.asarray(points.points), np.asarray(points.normals)
+        return RunGains(at, normals, chosen, numbers, runs, channels)

@@ -13,7 +13,15 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import SkyTable
-from ...numerics import Array, Stream, cosine_hemisphere, map_chunks, orthonormal_basis, stratified_square
+from ...numerics import (
+    Array,
+    Stream,
+    TakenRows,
+    cosine_hemisphere,
+    map_chunks,
+    orthonormal_basis,
+    stratified_square,
+)
 from ...rays import Hits, RayCaster
 from .bright_patches import AimedRays, AimedTable, BrightElements
 from .footprints import Footprints
@@ -87,7 +95,7 @@ class FinalGather:
         self,
         caster: RayCaster,
         at: Footprints,
-        surface_normals: Array,
+        surface_normals: Array | TakenRows,
         rays: int,
         resolve: Resolver,
         leaves_of: Resolver,

@@ -13,6 +13,7 @@ from ...lights import Lamp
 from ...numerics import (
     Array,
     Scratch,
+    TakenRows,
     fill_chunks,
     marked,
     row_numbers,
@@ -80,8 +81,8 @@ class Footprints:
     scratch: Makes arrays of what is found at the points.
     """
 
-    points: Array
-    normals: Array
+    points: Array | TakenRows
+    normals: Array | TakenRows
     keys: Array
     sampler: Sampler | None = None
     near: Callable[[Array], Array] | None = None

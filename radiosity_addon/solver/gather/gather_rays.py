@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array
+from ...numerics import Array, TakenRows
 from .bright_patches import BrightElements
 from .element_lookup import ElementLookup
 from .final_gather import FinalGather, GatheredHits
@@ -29,7 +29,7 @@ class Gather:
     def at(
         self,
         points: Footprints,
-        surface_normals: Array,
+        surface_normals: Array | TakenRows,
         rays: int,
         resolve: Resolver,
         irradiance: Array | None = None,
@@ -52,7 +52,7 @@ class Gather:
     def again_at(
         self,
         points: Footprints,
-        surface_normals: Array,
+        surface_normals: Array | TakenRows,
         resolve: Resolver,
         before: Before,
         irradiance: Array | None = None,
@@ -89,7 +89,7 @@ class Gather:
         return total
 
     def _gathering(
-        self, points: Footprints, surface_normals: Array, rays: int, resolve: Resolver
+        self, points: Footprints, surface_normals: Array | TakenRows, rays: int, resolve: Resolver
     ) -> FinalGather:
         elements = self._elements
         return FinalGather(

@@ -117,7 +117,7 @@ class LampVisibility:
         # Points that face one way and lie together.
         side = np.abs(at.normals).argmax(axis=1)
         side += 3 * (np.take_along_axis(at.normals, side[:, None], axis=1)[:, 0] < 0)
-        order = np.argsort(along_curve(at.points) + (side << 30), kind="stable")
+        order = np.argsort(along_curve(np.asarray(at.points)) + (side << 30), kind="stable")
         self._block = np.empty(count, dtype=np.int32)
         self._block[order] = np.arange(count) * blocks // max(count, 1)
         self._free, self._rays = np.zeros((2, blocks, self.columns), dtype=np.float32)
