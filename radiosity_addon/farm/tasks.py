@@ -22,21 +22,19 @@ KERNELS = frozenset(
     (
         "solver.gather.final_gather:_trace",
         "solver.gather.footprints:_at_centers",
-        "solver.gather.footprints:_spread",
         "solver.gather.footprints:_varying",
         "solver.gather.group_shadows:_first_rays",
         "solver.gather.group_shadows:_learned_rays",
         "solver.gather.retracing:_retrace",
         "solver.gather.run_gains:_seen_of_run",
         "solver.gather.soft_shadows:_shadowed",
-        "lightmap.points.interpolation:_fitted",
         "lightmap.points.smoothing:_alike",
-        "lightmap.texels.cells:_anchors",
         "lightmap.texels.occlusion:_find",
     )
 )
 """Those whose work is more than what they read and find. Sweeps are not among them: they read all texels'
-radiosity, which is new each time, to add up a few numbers for each."""
+radiosity, which is new each time, to add up a few numbers for each. Nor are places in texels, where texels
+ask for light and hits for cells: they are quickly found, and would be a third of what a large bake moves."""
 
 
 def is_kernel(function: Any) -> bool:
