@@ -28,6 +28,7 @@ KERNELS = frozenset(
         "solver.gather.retracing:_retrace",
         "solver.gather.run_gains:_seen_of_run",
         "solver.gather.soft_shadows:_shadowed",
+        "lightmap.points.interpolation:_supported",
         "lightmap.points.smoothing:_alike",
         "lightmap.texels.occlusion:_find",
     )

@@ -78,6 +78,7 @@ class GatherPoints:
         scale = geometry.scale[geometry.triangle[texel]]
         grid = PointGrid(geometry.position, geometry.normal, texel, scale, len(self), size, geometry.scratch)
         self._grids.append(grid)
+        self._number = _writable(self._number, geometry.scratch)
         self._number[texel] = numbers
         level = np.full(len(texel), len(self._grids) - 1, dtype=np.int8)
         self.level = np.concatenate([self.level, level])
@@ -163,25 +164,32 @@ class GatherPoints:
             result[rows] = np.minimum(result[rows], np.minimum.reduceat(farthest, first))
         return np.asarray(result)
 
-    def support(self, texels: Array, progress: Progress = SILENT) -> Array:
+    def support(self, texels: Array, least: float = 1.0, progress: Progress = SILENT) -> Array:
         """Return (n,) the summed weights around texels, less of points on one side (`BESIDE`).
 
-        Below 1 they need a point of their own. From then on no point speaks for them that lies farther
-        off than their neighbors allow.
+        From then on no point speaks for them that lies farther off than their neighbors allow.
+
+        least: With less than this they become points themselves.
         """
         scratch = self._geometry.scratch
-        total = scratch.empty(len(texels))
+        total, farthest = scratch.empty(len(texels)), scratch.empty(len(texels))
         kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
         self._weighed = WeightedPairs.nothing()
-        for rows, (weights, farthest, pairs) in map_chunks(
-            partial(_supported, self, texels), len(texels), CHUNK, self.threads, progress
+        supported = partial(_supported, self, texels, least)
+        for rows, (*sums, count, point, weight) in map_chunks(
+            supported, len(texels), CHUNK, self.threads, progress
         ):
-            total[rows], self.farthest[texels[rows]] = weights, farthest
+            total[rows], farthest[rows] = sums
+            pairs = np.repeat(texels[rows], count), point, weight
             for table, values in zip(kept, pairs, strict=True):
                 table.extend(values)
+        self.farthest = _writable(self.farthest, scratch)
+        for rows in tiles(len(texels)):
+            self.farthest[texels[rows]] = farthest[rows]
         in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
         if in_order and len(texels):
-            self._weighed = WeightedPairs(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
+            known = np.concatenate([texels[rows][total[rows] >= least] for rows in tiles(len(texels))])
+            self._weighed = WeightedPairs(len(self._grids), known, *(table.all()[:, 0] for table in kept))
         return total
 
     def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
@@ -214,9 +222,12 @@ class GatherPoints:
 
 
 def _supported(
-    points: GatherPoints, texels: Array, rows: slice
-) -> tuple[Array, Array, tuple[Array, Array, Array]]:
-    """Return (r,) summed weights around texels, how far things are, and pairs with weights above 0."""
+    points: GatherPoints, texels: Array, least: float, rows: slice
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return (r,) summed weights around texels, how far things are, and how many points speak for each.
+
+    Then these points and their weights above 0, in order: none for texels that get less than `least`.
+    """
     texels = texels[rows]
     row, point = points.pairs(texels)
     seen = points.sees(texels[row], point)
@@ -226,8 +237,20 @@ def _supported(
     reached = np.flatnonzero(weight)
     away = _beside(points, texels, row[reached], point[reached], weight[reached], total)
     total = total / (1.0 + (away / BESIDE) ** 2)
+    reached = reached[total[row[reached]] >= least]
+    count = np.bincount(row[reached], minlength=len(texels)).astype(np.uint8)
     # In single precision: they are kept for all texels.
-    return total, farthest, (texels[row[reached]], point[reached], weight[reached].astype(np.float32))
+    return total, farthest, count, point[reached], weight[reached].astype(np.float32)
+
+
+def _writable(array: Array, scratch: Scratch) -> Array:
+    """Return an array, or a copy of one that must not change because others read it."""
+    if array.flags.writeable:
+        return array
+    copy = scratch.empty(array.shape, array.dtype)
+    for rows in tiles(len(array)):
+        copy[rows] = array[rows]
+    return copy
 
 
 def _bend(geometry: TexelGeometry, one: Array, other: Array) -> Array:

@@ -304,7 +304,7 @@ def _choose(
         candidates[points.texel] = False
     candidates = row_numbers(candidates)
     if len(points):
-        reached = points.support(candidates, progress)
+        reached = points.support(candidates, support, progress)
         candidates = candidates[(reached < support) | crossings.next_to_crossed[candidates]]
     return candidates
 
