@@ -49,6 +49,7 @@ from .sampling import (
 )
 from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
 from .short_rows import across
+from .sorted_places import places_in
 from .streams import LAMP_STEP, LIGHT_STEP, SHADOW_STEP, Stream
 from .taken_rows import TakenRows
 from .triangles import (
@@ -111,6 +112,7 @@ __all__ = [
     "orthonormal_basis",
     "pick_in_rows",
     "pick_in_runs",
+    "places_in",
     "plane_weights_at",
     "point_on_each_triangle",
     "points_at",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, Scratch, orthonormal_basis, tiles
+from ...numerics import Array, Scratch, orthonormal_basis, places_in, tiles
 
 PER_CELL = 2
 """Points taken from a cell: on a lattice as wide as the cells there are hardly more."""
@@ -72,18 +72,14 @@ class PointGrid:
         tangent, bitangent = (np.ascontiguousarray(axis.T) for axis in orthonormal_basis(normal))
         middle = np.ascontiguousarray((position / self._widths(scale)[:, None]).T)
         facing = _facing(normal) + _SCALE_PRIME * scale
-        keys: list[Array] = []
-        for spot, (i, j) in enumerate(_SPOTS):
-            key = _hash(middle + i * tangent + j * bitangent) + facing
+        keys = np.stack([_hash(middle + i * tangent + j * bitangent) + facing for i, j in _SPOTS])
+        starts = places_in(self._sorted, keys.ravel()).reshape(keys.shape)
+        for spot, (key, start) in enumerate(zip(keys, starts, strict=True)):
             # In a tilted plane two of the nine may lie in one cell.
-            again = np.logical_or.reduce([key == other for other in keys]) if keys else None
-            keys.append(key)
-            start = np.searchsorted(self._sorted, key)
+            again = (keys[:spot] == key).any(axis=0)
             for which in range(PER_CELL):
                 slot = np.minimum(start + which, len(self._sorted) - 1)
-                same = self._sorted.take(slot) == key
-                if again is not None:
-                    same &= ~again
+                same = (self._sorted.take(slot) == key) & ~again
                 found[:, spot * PER_CELL + which] = np.where(same, self._numbers.take(slot), NONE)
         return found
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, TakenRows, tiles
+from ...numerics import Array, TakenRows, places_in, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, ElementCells, Footprints, GatheredHits, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood
@@ -219,7 +219,7 @@ class TableRows:
             if not is_small.any():
                 continue
             wanted = numbers[tile][is_small]
-            place = np.searchsorted(self._small, wanted)
+            place = places_in(self._small, wanted)
             there = self._small.take(place, mode="clip") == wanted
             numbers[tile][is_small] = np.where(there, self._first + place, NOTHING)
 
