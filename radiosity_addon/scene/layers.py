@@ -177,7 +177,9 @@ class PolygonRuns:
 
     def __init__(self, first: Array, polygons: Array) -> None:
         self.first, self._polygons = first, polygons
-        self._low, self._high = polygons.min(axis=1) - BOX_MARGIN, polygons.max(axis=1) + BOX_MARGIN
+        # One row a coordinate: to take from a column, NumPy copies the whole column first.
+        self._low = np.ascontiguousarray(polygons.min(axis=1).T - BOX_MARGIN)
+        self._high = np.ascontiguousarray(polygons.max(axis=1).T + BOX_MARGIN)
 
     def holding(self, row: Array, place: Array) -> tuple[Array, Array]:
         """Return the pairs of points (n,) and polygons of their `row` (n,) that they lie in.
@@ -189,7 +191,7 @@ class PolygonRuns:
         polygon = run_numbers(count, self.first[row])
         for axis in range(2):
             along = place[:, axis].take(point)
-            near = (along >= self._low[:, axis].take(polygon)) & (along <= self._high[:, axis].take(polygon))
+            near = (along >= self._low[axis].take(polygon)) & (along <= self._high[axis].take(polygon))
             point, polygon = point[near], polygon[near]
         corners = self._polygons.shape[1]
         for edge in range(corners):

@@ -264,13 +264,10 @@ def _beside(
 ) -> Array:
     """Return (r,) how many texels away the weighted mean of the points around each texel is."""
     geometry = points._geometry
-    start, end, sums = texels[row], points.texel[point], []
-    for axis in range(3):
-        place = geometry.position[:, axis]
-        along = place.take(end)
-        along -= place.take(start)
-        along *= weight
-        sums.append(np.bincount(row, along, minlength=len(texels)))
+    # Taken row by row: to take from a column, NumPy copies the whole column first.
+    along = geometry.position.take(points.texel[point], axis=0)
+    along -= geometry.position.take(texels[row], axis=0)
+    sums = [np.bincount(row, along[:, axis] * weight, minlength=len(texels)) for axis in range(3)]
     away = np.linalg.norm(sums, axis=0) / np.maximum(total, 1e-12)
     return np.asarray(away / np.sqrt(geometry.texel_area[geometry.triangle[texels]]))
 
