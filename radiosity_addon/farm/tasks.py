@@ -34,8 +34,8 @@ KERNELS = frozenset(
     )
 )
 """Those whose work is more than what they read and find. Sweeps are not among them: they read all texels'
-radiosity, which is new each time, to add up a few numbers for each. Nor are places in texels, where texels
-ask for light and hits for cells: they are quickly found, and would be a third of what a large bake moves."""
+radiosity, which is new each time, to add up a few numbers for each. Nor are places in texels, which are
+quickly found, and how points speak for texels in the end: a third of what a large bake would move."""
 
 
 def is_kernel(function: Any) -> bool:

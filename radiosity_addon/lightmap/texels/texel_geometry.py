@@ -35,8 +35,7 @@ class TexelGeometry:
     page_of_triangle (t,) int32: −1 where a triangle has no lightmap.
     texels: One per page.
     rows sequence of (p,) int: Per page, the scene triangle of each of the page's triangles.
-    scratch: Makes the texels' arrays; None keeps them in memory.
-    scratch: Makes arrays of what else there is of each texel.
+    scratch: Makes the texels' arrays, and those of what else there is of each; None keeps them in memory.
     uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
     page (n,) int16, or int32 where there are more pages.
     page_start (pages + 1,) int64: The first texel of each page, and n.
@@ -102,8 +101,7 @@ class TexelGeometry:
             self.whole[many] = False
             self.normal[many] = self.shared.shading
             own = scratch.empty(count, np.int32)
-            for tile in tiles(count):
-                own[tile] = self.triangle[tile]
+            own[:] = self.triangle
             own[many] = len(scene.face_normals) + np.arange(len(many))
             facing = np.concatenate([scene.face_normals, self.shared.facing])
             self.surface_normal = TakenRows(facing, own)
