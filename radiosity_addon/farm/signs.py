@@ -38,17 +38,22 @@ def is_alive(number: int) -> bool:
     return True
 
 
-def other_baker(sign: Path) -> tuple[str, str] | None:
-    """Return the machine and the number of another process that bakes through the spool of this sign."""
+def baker(sign: Path) -> tuple[str, str] | None:
+    """Return the machine and the number of the process that bakes through the spool of this sign."""
     try:
         host, number = sign.read_text().split()
-        if [host, number] == this_process().split():
-            return None
         silence = time.time() - sign.stat().st_mtime
-        alive = is_alive(int(number)) if host == socket.gethostname() else silence < SILENCE
+        asked = host == socket.gethostname() and sys.platform != "win32"
+        alive = is_alive(int(number)) if asked else silence < SILENCE
     except (OSError, ValueError, OverflowError):
         return None
     return (host, number) if alive else None
+
+
+def other_baker(sign: Path) -> tuple[str, str] | None:
+    """Return the same, if it is not this process."""
+    found = baker(sign)
+    return None if found is None or " ".join(found) == this_process() else found
 
 
 def refuse_second_bake(sign: Path) -> None:

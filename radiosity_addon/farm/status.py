@@ -6,9 +6,12 @@ from contextlib import suppress
 
 from .objects import ObjectError
 from .prepared import PreparedBake
+from .signs import baker
 from .spool import Spool
 from .stages import Stage, finished_into, stage_of
 from .tasks import task_count
+
+NOBODY = "no bake goes on here: one that is started with this spool goes on with what it holds"
 
 
 def status_lines(spool: Spool) -> list[str]:
@@ -34,9 +37,12 @@ def _of_stage(spool: Spool, stage: Stage) -> list[str]:
 def _of_bake(spool: Spool) -> list[str]:
     if spool.is_over():
         return ["the bake has ended"]
-    digest = spool.open_call()
+    who, digest = baker(spool.sign), spool.open_call()
+    if who is None:
+        return [NOBODY, _sizes(spool)]
     if digest is None:
-        return ["the bake computes what is not shared, or has not started"]
+        host, number = who
+        return [f"process {number} on {host} computes what is not shared", _sizes(spool)]
     try:
         call = spool.call(digest)
         kernel = call["kernel"]["partial"][0]["function"]
@@ -44,11 +50,14 @@ def _of_bake(spool: Spool) -> list[str]:
     except (ObjectError, KeyError, TypeError, IndexError) as error:
         return [f"the call that waits cannot be read: {error}"]
     done, claimed = spool.done(digest), spool.claimed(digest)
-    return [
-        f"{kernel}: {len(done)} of {total} tasks done, {len(claimed - done)} begun",
-        f"{_megabytes(spool, 'arrays/*', 'objects/*')} MB of inputs, "
-        f"{_megabytes(spool, 'calls/*/*.result')} MB of results",
-    ]
+    return [f"{kernel}: {len(done)} of {total} tasks done, {len(claimed - done)} begun", _sizes(spool)]
+
+
+def _sizes(spool: Spool) -> str:
+    """Return how much is kept."""
+    inputs = _megabytes(spool, "arrays/*", "objects/*")
+    results = _megabytes(spool, "calls/*/*.result")
+    return f"{inputs} MB of inputs, {results} MB of results"
 
 
 def _megabytes(spool: Spool, *patterns: str) -> str:

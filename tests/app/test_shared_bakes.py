@@ -350,7 +350,7 @@ def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
         words = [sys.executable, "-m", "radiosity_addon.farm", "status", str(tmp_path)]
         return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True).stdout
 
-    assert "has not started" in status()
+    assert f"process {os.getpid()} on" in status()
     name = min(KERNELS)
     call = (
         f'{{"kernel": {{"partial": [{{"function": "{name}"}}, 1, 2]}}, "slices": [[0, 1], [1, 2], [2, 3]]}}'
@@ -363,5 +363,11 @@ def test_status_says_how_far_the_bake_is(tmp_path: Path) -> None:
     said = status()
     assert f"{name}: 1 of 3 tasks done, 1 begun" in said
     assert "0.4 MB of inputs, 0.0 MB of results" in said
+    spool.close_call()
+    said = status()
+    assert "computes what is not shared" in said
+    assert "0.4 MB of inputs" in said
+    spool.leave()
+    assert status().startswith("no bake goes on here")
     spool.end()
     assert "has ended" in status()
