@@ -24,7 +24,7 @@ ERROR_SETTING = next(
 )
 """The field of the target error, where this version has it."""
 
-CONTENTS = 2
+CONTENTS = 3
 """Version of what a prepared case's folder holds."""
 
 ASKED_ERRORS = (0.05, 0.03, 0.02, 0.01)

@@ -11,7 +11,7 @@ import numpy as np
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.files import empty_scene, open_scene
 from radiosity_addon.blender.scene_export.export import export_scene
-from radiosity_addon.lightmap.texels.rasterization import rasterize
+from radiosity_addon.lightmap.texels.rasterization import rasterize, sample_footprints
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
@@ -31,6 +31,9 @@ SCENE, TEXELS = "scene.blend", "texels.npz"
 
 COINCIDENT = 1e-3
 """Faces so near each other are coincident: Cycles bakes them black, or lit through each other [m]."""
+
+ALONG, PART = 4, 0.1
+"""A texel lies on coincident faces if this part of ALONG × ALONG points on it do."""
 
 
 def case_of(job: dict[str, Any]) -> Case:
@@ -106,7 +109,11 @@ def _center_inside(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inside, coincident = np.zeros((2, case.resolution, case.resolution), dtype=bool)
     own = texels.center_inside & (scene.scene.reflectance[texels.triangle].min(axis=1) > 0)
     inside[texels.row[own], texels.column[own]] = True
-    against = _lies_against(scene.scene, texels.triangle, texels.centroid)
+    spots = (np.stack(np.meshgrid(np.arange(ALONG), np.arange(ALONG)), axis=-1).reshape(-1, 2) + 0.5) / ALONG
+    spots = np.broadcast_to(spots, (len(texels), ALONG**2, 2))
+    points = sample_footprints(texels, spots, 1.0).swapaxes(0, 1)
+    parts = [_lies_against(scene.scene, texels.triangle, weights) for weights in points]
+    against = np.mean(parts, axis=0) >= PART
     coincident[texels.row[against], texels.column[against]] = True
     return inside, coincident, uv
 
