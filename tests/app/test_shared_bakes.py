@@ -136,7 +136,12 @@ def test_any_number_of_workers_gives_the_same_bytes(
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal here")
 @pytest.mark.parametrize(
-    "kernel", ["solver.gather.soft_shadows:_shadowed", "solver.gather.final_gather:_trace"]
+    "kernel",
+    [
+        "solver.gather.soft_shadows:_shadowed",
+        "lightmap.points.interpolation:_supported",
+        "solver.gather.final_gather:_trace",
+    ],
 )
 def test_a_worker_that_is_killed_costs_its_task_alone(
     kernel: str, name: str, alone: str, tmp_path: Path, workers: Callable[[str], subprocess.Popen[str]]
