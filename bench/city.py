@@ -110,6 +110,8 @@ def main() -> None:
     parser.add_argument("--resolution", type=int, default=2048)
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
+    if any(chosen.folder.iterdir()):
+        parser.error(f"'{chosen.folder}' is not empty: give another folder")
     build(chosen.folder / "city.blend", chosen.houses)
     settings = {"pages": chosen.pages, "resolution": chosen.resolution, "quality": "draft", "threads": 2,
                 "memory_limit": 7}  # fmt: skip

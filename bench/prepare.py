@@ -111,9 +111,9 @@ def _center_inside(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inside[texels.row[own], texels.column[own]] = True
     spots = (np.stack(np.meshgrid(np.arange(ALONG), np.arange(ALONG)), axis=-1).reshape(-1, 2) + 0.5) / ALONG
     spots = np.broadcast_to(spots, (len(texels), ALONG**2, 2))
-    points = sample_footprints(texels, spots, 1.0).swapaxes(0, 1)
-    parts = [_lies_against(scene.scene, texels.triangle, weights) for weights in points]
-    against = np.mean(parts, axis=0) >= PART
+    weights = sample_footprints(texels, spots, 1.0).reshape(-1, 3)
+    points = _lies_against(scene.scene, np.repeat(texels.triangle, ALONG**2), weights)
+    against = points.reshape(len(texels), -1).mean(axis=1) >= PART
     coincident[texels.row[against], texels.column[against]] = True
     return inside, coincident, uv
 

@@ -177,7 +177,9 @@ def test_canceling_ends_the_command(
     command, baking = farm_of(bpy.context)
     assert command is not None
     settings = BakeSettings(resolution=256, quality="sketch")
-    job = ended_with(run_bake(bpy.context, settings, None, in_background=True, baking=baking), command)
+    job = ended_with(
+        run_bake(bpy.context, settings, None, in_background=True, baking=baking), command
+    )
     while not (waits[0] and preferred.note.exists()):
         next(job)
     number = json.loads(preferred.note.read_text())[0]
@@ -225,11 +227,11 @@ def test_spools_of_bakes_that_were_killed_go_after_a_day(
 
 
 def test_words_are_split_as_a_shell_would() -> None:
-    line = r"""ssh -p 22 "my host" 'run it' a\ b "{spool}/x" # all"""
+    line = r'''ssh -p 22 "my host" 'run it' a\ b "{spool}/x" # all'''
     assert split(line, windows=False) == [
         "ssh", "-p", "22", "my host", "run it", "a b", "{spool}/x", "#", "all",
     ]  # fmt: skip
-    line = r'"C:\Program Files\Blender\blender.exe" -b --command radiosity worker {spool} \\nas\it' "s"
+    line = r'"C:\Program Files\Blender\blender.exe" -b --command radiosity worker {spool} \\nas\it''s'
     assert split(line, windows=True) == [
         r"C:\Program Files\Blender\blender.exe", "-b", "--command", "radiosity", "worker", "{spool}",
         r"\\nas\its",
