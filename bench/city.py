@@ -46,7 +46,7 @@ class Watch:
             says = dict(line.split(":", 1) for line in status.splitlines())
             number = int(process.name)
             if self._process in (number, int(says["PPid"])) and "RssAnon" in says:
-                now = int(says["RssAnon"].split()[0]) / 1024
+                now = int(says["RssAnon"].split()[0]) * 1024 / 1e6
                 self.memory_MB[number] = max(self.memory_MB.get(number, 0.0), now)
         self.folder_MB = max(self.folder_MB, _size(self._folder) / 1e6)
 

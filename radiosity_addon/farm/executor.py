@@ -75,9 +75,11 @@ class FolderExecutor:
                         writer.ray_counts[name].add(rays)
                 yield from found.values
                 progress.at((task + 1) / call.count)
+                self._store.remove_unused()
         finally:
             self._spool.close_call()
             call.close()
+            self._store.end_call()
             record.ended = time.monotonic()
 
 

@@ -12,7 +12,7 @@ import hashlib
 import importlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, MutableMapping
 from functools import cached_property, partial
 from threading import Lock
 from types import FunctionType, MethodType
@@ -22,7 +22,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..rays import RayCount
-from .recent import Recent
 
 Array = npt.NDArray[Any]
 Tree = Any
@@ -176,8 +175,8 @@ class Reader:
     known: Objects made before, by their digests; takes those made now.
     """
 
-    def __init__(self, store: Store, known: Recent[Any] | None = None) -> None:
-        self._store, self._known = store, Recent() if known is None else known
+    def __init__(self, store: Store, known: MutableMapping[str, Any] | None = None) -> None:
+        self._store, self._known = store, {} if known is None else known
 
     def value(self, tree: Tree) -> Any:
         """Return the value of a tree. Raises ObjectError if `Writer` cannot have written it."""
@@ -239,7 +238,8 @@ class Reader:
         restore_state(result, None if state is None else self._value(state))
         if (count := _ray_count(result)) is not None:
             count.name = digest
-        return self._known.put(digest, result)
+        self._known[digest] = result
+        return result
 
 
 def name_of(what: type | FunctionType) -> str:

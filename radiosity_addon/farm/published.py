@@ -1,11 +1,15 @@
-"""Arrays that were published once are not read again to find their digests.
+"""Arrays that were published once are not read again to find their digests, and leave the spool when they are
+no longer needed.
 
-They are made read-only for this: had they changed, what was published would be wrong.
+They are made read-only for this: had they changed, what was published would be wrong. An array whose memory
+is free cannot be read by a later call; a bake that is started again writes what it needs.
 """
 
 from __future__ import annotations
 
+import time
 import weakref
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -18,6 +22,9 @@ Array = npt.NDArray[Any]
 WORTH_KNOWING = 1 << 16
 """Bytes of arrays whose digests are remembered: those of smaller ones take no time."""
 
+GRACE = 60.0
+"""Seconds that an array stays in the spool at least: a worker may still be at a task of the last call."""
+
 
 class PublishedArrays:
     """A spool that remembers what it was given; see `objects.Store`."""
@@ -25,6 +32,9 @@ class PublishedArrays:
     def __init__(self, spool: Spool) -> None:
         self._spool = spool
         self._digests: dict[tuple[Any, ...], tuple[weakref.ref[Array], str]] = {}
+        self._of_call: list[Array] = []
+        self._gone: deque[tuple[float, str]] = deque()
+        """When arrays' memory was freed, and their digests."""
 
     def put_object(self, digest: str, text: str) -> None:
         """See `Store`."""
@@ -45,12 +55,30 @@ class PublishedArrays:
         root = _root(array)
         key = (id(root), array.__array_interface__["data"][0], array.shape, array.strides, array.dtype.str)
         known = self._digests.get(key)
+        self._of_call.append(root)
         if known is not None and known[0]() is root and not root.flags.writeable:
             return known[1]
         digest = self._spool.put_array(array)
         root.flags.writeable = array.flags.writeable = False
-        self._digests[key] = weakref.ref(root), digest
+        freed = weakref.ref(root, lambda _: self._gone.append((time.monotonic(), digest)))
+        self._digests[key] = freed, digest
         return digest
+
+    def end_call(self) -> None:
+        """Let go of the arrays of a call, some of which were made for it alone."""
+        self._of_call.clear()
+
+    def remove_unused(self) -> None:
+        """Remove arrays from the spool whose memory is free."""
+        late = time.monotonic() - GRACE
+        if not self._gone or self._gone[0][0] > late:
+            return
+        self._digests = {key: known for key, known in self._digests.items() if known[0]() is not None}
+        used = {digest for _, digest in self._digests.values()}
+        while self._gone and self._gone[0][0] <= late:
+            _, digest = self._gone.popleft()
+            if digest not in used:
+                self._spool.remove_array(digest)
 
 
 def _root(array: Array) -> Array:

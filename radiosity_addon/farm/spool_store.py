@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import re
 import uuid
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,6 @@ import numpy.typing as npt
 
 from ..base import BakeError
 from .objects import KINDS, ObjectError, array_digest, digest_of
-from .recent import Recent
 
 Array = npt.NDArray[Any]
 
@@ -37,7 +37,8 @@ class SpoolStore:
     def __init__(self, path: Path) -> None:
         self.path = path.expanduser().resolve()
         self.input_bytes = 0
-        self._arrays: Recent[Array] = Recent()
+        self._arrays: weakref.WeakValueDictionary[str, Array] = weakref.WeakValueDictionary()
+        self._own: set[str] = set()
 
     def put_object(self, digest: str, text: str) -> None:
         """See `Store`."""
@@ -55,11 +56,22 @@ class SpoolStore:
         array = np.ascontiguousarray(array)
         digest = array_digest(array)
         path = self._at("arrays", digest, ".npy")
-        if not path.exists() or not self._is_whole(digest):
+        is_there = path.exists()
+        if not is_there or not self._is_whole(digest):
             with self._replacing(path) as aside, aside.open("wb") as file:
                 np.save(file, array, allow_pickle=False)
             self.input_bytes += array.nbytes
+            if not is_there:
+                self._own.add(digest)
         return digest
+
+    def remove_array(self, digest: str) -> None:
+        """Remove an array that was not in the spool before it was written through this store."""
+        if digest in self._own:
+            self._own.discard(digest)
+            # Where files cannot be removed while somebody reads them, it stays.
+            with contextlib.suppress(OSError):
+                self._at("arrays", digest, ".npy").unlink()
 
     def _is_whole(self, digest: str) -> bool:
         try:
@@ -70,8 +82,10 @@ class SpoolStore:
 
     def array(self, digest: str) -> Array:
         """See `Store`; it stays in its file, and is checked when it is first read."""
-        known = self._arrays.get(digest)
-        return self._arrays.put(digest, self._read_array(digest)) if known is None else known
+        found = self._arrays.get(digest)
+        if found is None:
+            found = self._arrays[digest] = self._read_array(digest)
+        return found
 
     def _read_array(self, digest: str) -> Array:
         path = self._at("arrays", digest, ".npy")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import MutableMapping
 from functools import partial
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from ..rays import counted_apart
 from .objects import ObjectError, Reader, Writer, digest_of, name_of
-from .recent import Recent
 from .signs import this_process
 from .spool import Spool
 
@@ -46,7 +46,9 @@ def is_kernel(function: Any) -> bool:
         return False
 
 
-def read_kernel(spool: Spool, digest: str, known: Recent[Any]) -> tuple[partial[Any], list[list[int]]]:
+def read_kernel(
+    spool: Spool, digest: str, known: MutableMapping[str, Any] | None = None
+) -> tuple[partial[Any], list[list[int]]]:
     """Return a call's kernel and the bounds of its slices.
 
     known: Objects that were made before; takes further ones.

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 from ..base import BakeError
 from ..cli import quoted
 from .objects import ObjectError
-from .recent import Recent
 from .signs import BakeWatch
 from .spool import RECORD, Spool
 from .tasks import read_kernel, run_task, task_count
 
 SHORTEST, LONGEST = 0.01, 0.1
 """Seconds between looks for work: longer the longer there is none."""
+
+KEPT_CALLS = 8
+"""Calls whose objects and arrays stay at hand: most are those of the call before."""
 
 
 def wait_for(path: Path, seconds: float) -> Spool:
@@ -50,7 +54,8 @@ def work(
     """
     count, pause, since = 0, SHORTEST, time.monotonic()
     watch = BakeWatch(spool.sign) if with_bake else None
-    known: Recent[Any] = Recent()
+    known: WeakValueDictionary[str, Any] = WeakValueDictionary()
+    kept: deque[Any] = deque(maxlen=KEPT_CALLS)
     read, kernel, bounds = "", None, list[list[int]]()
     while not spool.is_over() and time.monotonic() - since < idle:
         if watch is not None and watch.is_gone():
@@ -62,6 +67,7 @@ def work(
                 if digest != read:
                     kernel, bounds = read_kernel(spool, digest, known)
                     read = digest
+                    kept.append(kernel)
             except ObjectError as error:
                 if not spool.is_over() and spool.open_call() == digest:
                     say(f"call {digest} is left to others: {error}")
@@ -103,7 +109,7 @@ def do_task(spool: Spool, name: str) -> None:
     if number.isascii() and number.isdecimal() and len(number) < 9 and digest == spool.open_call():
         task = int(number)
         try:
-            kernel, bounds = read_kernel(spool, digest, Recent())
+            kernel, bounds = read_kernel(spool, digest)
         except ObjectError as error:
             raise BakeError(f"task {name} cannot be done: {error}") from error
         if task < task_count(len(bounds)) and task not in spool.done(digest):

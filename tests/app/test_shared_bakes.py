@@ -19,7 +19,7 @@ import pytest
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.base import BakeError
 from radiosity_addon.blender.command_line.main import main
-from radiosity_addon.farm import Spool, run_command, shared_bake
+from radiosity_addon.farm import Spool, published, run_command, shared_bake
 from radiosity_addon.farm.tasks import KERNELS
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -35,10 +35,12 @@ ROOMS = {"room": room, "glass": glazed_room}
 BAKE = """
 import sys
 from pathlib import Path
-from radiosity_addon.farm import executor
+from radiosity_addon.farm import executor, published
 from tests.app.test_shared_bakes import baked_bytes, ROOMS
 from tests.moments import ends_after, waits_for_a_worker
 spool, name, kernel, results = sys.argv[1:]
+# What is not needed any more leaves at once.
+published.GRACE = 0.0
 if kernel:
     # A small room's calls have few slices.
     executor.FEWEST = 2
@@ -120,6 +122,7 @@ def test_any_number_of_workers_gives_the_same_bytes(
     workers: Callable[[], subprocess.Popen[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(published, "GRACE", 0.0)
     Spool.to_bake(tmp_path / "spool")
     helping = [workers() for _ in range(count)]
     if count:

@@ -215,7 +215,8 @@ class _Grid:
         first = np.cumsum([0, *self._width**2])
         self._page = geometry.page
         self._number = self._scratch.empty(int(first[-1]), np.int32)
-        self._place = self._scratch.empty(len(geometry), np.int64)
+        few = first[-1] <= np.iinfo(np.int32).max
+        self._place = self._scratch.empty(len(geometry), np.int32 if few else np.int64)
         for width, start, page in zip(self._width, first, geometry.index, strict=False):
             padded = self._number[start : start + width * width].reshape(width, width)
             padded[[0, -1]] = padded[:, [0, -1]] = NO_TEXEL

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...numerics import Array, fill_chunks
+from ...numerics import Array, TakenRows, fill_chunks
 from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ...solver.gather import NOTHING, ElementLookup, Footprints
 from .occlusion import Crossings, below_hood
@@ -71,7 +71,8 @@ class TexelCells:
         """(d,) The divided texels."""
         self._divided = divided
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
-        self._own_anchors = geometry.scratch.empty((len(self.texel), OWN, 3))
+        # From the texels, as in `SpreadPoints`.
+        self._own_anchors = geometry.scratch.empty((len(self.texel), OWN, 3), np.float32)
         self._below = np.zeros((len(self.texel), CELLS_PER_TEXEL), dtype=bool)
         place = partial(_anchors, geometry, elements.caster, self._rim, self.texel)
         into = (self._own_anchors, self._below)
@@ -101,7 +102,8 @@ class TexelCells:
         position = geometry.positions_of(hits) + self._lift(texel)
         rank = self._rank[texel]
         foreign = (hits.triangle != geometry.triangle[texel]) & ~geometry.is_shared(texel)
-        anchors, first = self._own_anchors[rank], np.where(foreign, OWN, 0)
+        anchors = geometry.position[texel][:, None] + self._own_anchors[rank]
+        first = np.where(foreign, OWN, 0)
         anchors[foreign] = _pixel_anchors(geometry, caster, texel[foreign])
         apart = anchors - position[:, None]
         square = np.einsum("hkx,hkx->hk", apart, apart)
@@ -122,31 +124,32 @@ class TexelCells:
 
     def footprints(self, cell: Array) -> Footprints:
         """Return cells as footprints: their samples see the anchor."""
-        geometry, texel = self._geometry, self.texel_of(cell)
-        lift, below = self._lift(texel), self._below[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL]
-        anchor, own = self._anchor(cell), cell % CELLS_PER_TEXEL < OWN
-        cells = _ChosenCells(texel, _FIRST[cell % OWN], own, anchor, lift, below)
+        geometry, texel, anchor = self._geometry, self.texel_of(cell), self._anchor(cell)
+        part = (cell % CELLS_PER_TEXEL).astype(np.uint8)
+        cells = _ChosenCells(texel, part, anchor, self._below[cell // CELLS_PER_TEXEL, part])
         sample = partial(_sample, geometry, self.elements.caster, self._rim, cells)
-        return Footprints(anchor, geometry.normal[texel], self._keys(cell), sample, starts=STARTS)
+        normal = TakenRows(geometry.normal, texel)
+        return Footprints(anchor, normal, self._keys(cell), sample, starts=STARTS)
 
-    def upright(self, cell: Array) -> Array:
+    def upright(self, cell: Array) -> TakenRows:
         """Return (p, 3) the normals of the triangles that cells are on."""
-        return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
+        return TakenRows(self._geometry.surface_normal, self.texel_of(cell))
 
     def lit(self, cell: Array) -> Footprints:
         """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
-        return Footprints(self._anchor(cell), geometry.normal[texel], self._keys(cell), expected=expected)
+        normal = TakenRows(geometry.normal, texel)
+        return Footprints(self._anchor(cell), normal, self._keys(cell), expected=expected)
 
     def _anchor(self, cell: Array) -> Array:
         """Return (p, 3) the anchors of cells, not lifted."""
-        anchor = self._own_anchors[cell // CELLS_PER_TEXEL, cell % OWN]
+        texel = self.texel_of(cell)
+        anchor = self._geometry.position[texel] + self._own_anchors[cell // CELLS_PER_TEXEL, cell % OWN]
         others = np.flatnonzero(cell % CELLS_PER_TEXEL >= OWN)
-        texel = self.texel_of(cell[others])
-        spots = _pixel_anchors(self._geometry, self.elements.caster, texel)
+        spots = _pixel_anchors(self._geometry, self.elements.caster, texel[others])
         anchor[others] = spots[np.arange(len(others)), cell[others] % OWN]
-        return np.asarray(anchor - self._lift(self.texel_of(cell)))
+        return np.asarray(anchor - self._lift(texel))
 
     def _keys(self, cell: Array) -> Array:
         """Return (p,) int64 sampling keys of cells, which do not depend on other divided texels."""
@@ -163,17 +166,14 @@ class TexelCells:
 class _ChosenCells(NamedTuple):
     """Cells of texels.
 
-    first (p, 2): The corner next to the texel's first one, in its unit square.
-    own (p,) bool: Whether it is of the texel's own triangle.
-    anchor, lift (p, 3)
+    part (p,) uint8: Which of the texel's cells it is.
+    anchor (p, 3)
     below (p,) bool: Whether it is below a hood.
     """
 
     texel: Array
-    first: Array
-    own: Array
+    part: Array
     anchor: Array
-    lift: Array
     below: Array
 
 
@@ -181,13 +181,13 @@ def _sample(
     geometry: TexelGeometry, caster: RayCaster, rim: Array, cells: _ChosenCells, rows: Array, u: Array
 ) -> Array:
     """Return (r, k, 3) points of cells that see the anchor, or the anchor."""
-    texel, first, own_part, anchor, lift, below = (column[rows] for column in cells)
-    spots = first[:, None] + u / ALONG
+    texel, part, anchor, below = (column[rows] for column in cells)
+    spots, own_part = _FIRST[part % OWN][:, None] + u / ALONG, part < OWN
     points = np.empty((*spots.shape[:2], 3))
     points[own_part] = geometry.sample(texel[own_part], spots[own_part], 1.0)
     points[~own_part] = geometry.in_plane(texel[~own_part], spots[~own_part])
     back = np.broadcast_to(anchor[:, None], points.shape)
-    above = lift[:, None]
+    above = _lifted(geometry, caster, texel)[:, None]
     seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
     # Points behind a wall, or beyond an occluder's rim, do not belong to this cell.
     own = seen.reshape(points.shape[:2])
@@ -198,12 +198,13 @@ def _sample(
 def _anchors(
     geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, rows: slice
 ) -> tuple[Array, Array]:
-    """Return (r, 16, 3) the lifted anchors of texels' own cells, and (r, 32) which of all are hooded."""
+    """Return (r, 16, 3) from texels to the lifted anchors of own cells, and (r, 32) which of all are hooded."""
     texel = texel[rows]
     spots = np.broadcast_to(_SPOTS, (len(texel), OWN, 2))
     spread = geometry.sample(texel, spots, 1.0)
     both = np.concatenate([spread, geometry.in_plane(texel, spots)], axis=1)
-    return spread + _lifted(geometry, caster, texel)[:, None], _below_rim(geometry, caster, rim, texel, both)
+    anchor = spread + _lifted(geometry, caster, texel)[:, None]
+    return anchor - geometry.position[texel][:, None], _below_rim(geometry, caster, rim, texel, both)
 
 
 def _pixel_anchors(geometry: TexelGeometry, caster: RayCaster, texel: Array) -> Array:
