@@ -198,7 +198,7 @@ def _sample(
 def _anchors(
     geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, rows: slice
 ) -> tuple[Array, Array]:
-    """Return (r, 16, 3) from texels to the lifted anchors of own cells, and (r, 32) which of all are hooded."""
+    """Return (r, 16, 3) from texels to their cells' lifted anchors, and (r, 32) which of all are hooded."""
     texel = texel[rows]
     spots = np.broadcast_to(_SPOTS, (len(texel), OWN, 2))
     spread = geometry.sample(texel, spots, 1.0)
