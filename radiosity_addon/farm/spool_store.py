@@ -67,11 +67,12 @@ class SpoolStore:
 
     def remove_array(self, digest: str) -> None:
         """Remove an array that was not in the spool before it was written through this store."""
-        if digest in self._own:
+        path = self._at("arrays", digest, ".npy")
+        if digest in self._own and not path.parent.is_symlink():
             self._own.discard(digest)
             # Where files cannot be removed while somebody reads them, it stays.
             with contextlib.suppress(OSError):
-                self._at("arrays", digest, ".npy").unlink()
+                path.unlink()
 
     def _is_whole(self, digest: str) -> bool:
         try:
