@@ -69,7 +69,7 @@ class PublishedArrays:
         self._of_call.clear()
 
     def remove_unused(self) -> None:
-        """Remove arrays from the spool whose memory is free."""
+        """Remove arrays from the spool whose memory is free, also those that an interrupted bake has left."""
         late = time.monotonic() - GRACE
         if not self._gone or self._gone[0][0] > late:
             return
@@ -78,7 +78,7 @@ class PublishedArrays:
         while self._gone and self._gone[0][0] <= late:
             _, digest = self._gone.popleft()
             if digest not in used:
-                self._spool.remove_array(digest)
+                self._spool.remove_array(digest, others=self._spool.is_prepared())
 
 
 def _root(array: Array) -> Array:

@@ -31,7 +31,7 @@ from ..numerics import ArrayFileError, read_arrays, write_arrays
 from .identity import identity
 from .objects import ObjectError, digest_of
 from .signs import refuse_second_bake, take_away, this_process
-from .spool_store import Array, SpoolStore, explained, not_written
+from .spool_store import Array, SpoolStore, explained, linked, not_written
 
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
@@ -118,7 +118,7 @@ class Spool(SpoolStore):
         record = self._record()
         if record is None:
             return self.path.is_dir() and all(_OURS.fullmatch(path.name) for path in self.path.iterdir())
-        if not self.is_made_for(output) or (self.path / PREPARED).exists():
+        if not self.is_made_for(output) or self.is_prepared():
             return False
         refuse_second_bake(self.sign)
         if record.get("program") != identity():
@@ -152,7 +152,7 @@ class Spool(SpoolStore):
             raise BakeError(f"'{self.path}' is no spool; start the bake first, with --spool")
         for name in _FOLDERS:
             if (self.path / name).is_symlink():
-                raise BakeError(f"'{self.path / name}' is a link out of the spool: remove it")
+                raise linked(self.path / name)
         theirs, ours = record.get("program"), identity()
         if not isinstance(theirs, dict) or theirs != ours:
             theirs = theirs if isinstance(theirs, dict) else {}
@@ -171,6 +171,10 @@ class Spool(SpoolStore):
         except (OSError, ValueError, RecursionError):
             return None
         return record if isinstance(record, dict) and record.get("kind") == KIND else None
+
+    def is_prepared(self) -> bool:
+        """Return whether the bake was prepared: its inputs, and then its result, are needed after it."""
+        return (self.path / PREPARED).exists()
 
     # Calls and tasks
 
@@ -256,7 +260,9 @@ class Spool(SpoolStore):
 
     def has_results(self) -> bool:
         """Return whether there is anything that a bake can go on with."""
-        return any(self.path.glob("calls/*/*.result"))
+        with contextlib.suppress(OSError):
+            return any(self.path.glob("calls/*/*.result"))
+        return False  # it is being emptied
 
     def say_over(self) -> None:
         """Tell all workers that the bake has ended."""

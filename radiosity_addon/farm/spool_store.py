@@ -38,7 +38,7 @@ class SpoolStore:
         self.path = path.expanduser().resolve()
         self.input_bytes = 0
         self._arrays: weakref.WeakValueDictionary[str, Array] = weakref.WeakValueDictionary()
-        self._own: set[str] = set()
+        self._written: set[str] = set()
 
     def put_object(self, digest: str, text: str) -> None:
         """See `Store`."""
@@ -56,23 +56,28 @@ class SpoolStore:
         array = np.ascontiguousarray(array)
         digest = array_digest(array)
         path = self._at("arrays", digest, ".npy")
-        is_there = path.exists()
+        with explained(self.path):
+            is_there = path.exists()
         if not is_there or not self._is_whole(digest):
             with self._replacing(path) as aside, aside.open("wb") as file:
                 np.save(file, array, allow_pickle=False)
             self.input_bytes += array.nbytes
             if not is_there:
-                self._own.add(digest)
+                self._written.add(digest)
         return digest
 
-    def remove_array(self, digest: str) -> None:
-        """Remove an array that was not in the spool before it was written through this store."""
+    def remove_array(self, digest: str, others: bool) -> None:
+        """Remove an array.
+
+        others: What was not written through this store may be needed by others, and stays.
+        """
         path = self._at("arrays", digest, ".npy")
-        if digest in self._own and not path.parent.is_symlink():
-            self._own.discard(digest)
-            # Where files cannot be removed while somebody reads them, it stays.
-            with contextlib.suppress(OSError):
-                path.unlink()
+        if (others and digest not in self._written) or path.parent.is_symlink():
+            return
+        self._written.discard(digest)
+        # Where files cannot be removed while somebody reads them, it stays.
+        with contextlib.suppress(OSError):
+            path.unlink()
 
     def _is_whole(self, digest: str) -> bool:
         try:
@@ -90,9 +95,9 @@ class SpoolStore:
 
     def _read_array(self, digest: str) -> Array:
         path = self._at("arrays", digest, ".npy")
-        if path.exists() and not path.is_file():
-            raise ObjectError(f"'{path}' is no file of ours")
         try:
+            if path.exists() and not path.is_file():
+                raise ObjectError(f"'{path}' is no file of ours")
             found = np.load(path, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise ObjectError(f"array {digest}: {error}") from error
@@ -162,6 +167,9 @@ class SpoolStore:
         name = uuid.uuid4().hex
         aside = path.with_name(f".{name}") if path.parent == self.path else self.path / "aside" / name
         with explained(self.path):
+            for folder in (path.parent.parent, path.parent, aside.parent):
+                if folder.is_relative_to(self.path) and folder != self.path and folder.is_symlink():
+                    raise linked(folder)
             try:
                 yield aside
                 aside.replace(path)
@@ -169,6 +177,11 @@ class SpoolStore:
                 with contextlib.suppress(OSError):
                     aside.unlink()
                 raise
+
+
+def linked(path: Path) -> BakeError:
+    """Return the error for a folder of a spool that lies elsewhere."""
+    return BakeError(f"'{path}' is a link out of the spool: remove it")
 
 
 @contextlib.contextmanager

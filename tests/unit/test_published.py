@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from radiosity_addon.base import BakeError
 from radiosity_addon.farm import Spool, published
 from radiosity_addon.farm.published import WORTH_KNOWING, PublishedArrays
+from radiosity_addon.farm.spool import PREPARED
 
 
 @pytest.fixture
@@ -53,8 +55,18 @@ def test_an_array_stays_as_long_as_another_like_it_lives(spool: Spool) -> None:
     assert stored(spool) == set()
 
 
-def test_what_others_have_written_stays(spool: Spool) -> None:
+def test_what_an_interrupted_bake_has_left_leaves_as_well(spool: Spool) -> None:
+    Spool.to_work(spool.path).put_array(numbers())
+    store = PublishedArrays(spool)
+    store.put_array(numbers())
+    store.end_call()
+    store.remove_unused()
+    assert stored(spool) == set()
+
+
+def test_what_was_prepared_stays(spool: Spool) -> None:
     digest = Spool.to_work(spool.path).put_array(numbers())
+    spool.point(PREPARED, digest)
     store = PublishedArrays(spool)
     assert store.put_array(numbers()) == digest
     store.end_call()
@@ -66,6 +78,21 @@ def test_what_others_have_written_stays(spool: Spool) -> None:
     store.end_call()
     store.remove_unused()
     assert stored(spool) == {digest}
+
+
+@pytest.mark.parametrize("name", ["arrays", "aside"])
+def test_nothing_is_written_or_removed_through_links(spool: Spool, tmp_path: Path, name: str) -> None:
+    store, outside = PublishedArrays(spool), tmp_path / "outside"
+    digest = store.put_array(numbers())
+    (spool.path / name).rename(outside)
+    (spool.path / name).symlink_to(outside)
+    before = sorted(outside.iterdir())
+    store.end_call()
+    store.remove_unused()
+    with pytest.raises(BakeError, match=f"{name}' is a link out of the spool: remove it"):
+        store.put_array(numbers(1.0))
+    assert sorted(outside.iterdir()) == before
+    assert (spool.path / "arrays" / f"{digest}.npy").exists() == (name == "arrays")
 
 
 def test_an_array_stays_for_a_while(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
