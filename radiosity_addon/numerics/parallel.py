@@ -11,12 +11,14 @@ on other machines, run a kernel's chunks.
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
+from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from ..base import SILENT, Progress
@@ -27,6 +29,9 @@ T = TypeVar("T")
 
 POLL = 0.1
 """Seconds between looks for cancelation."""
+
+AHEAD = 8
+"""Slices a thread that are worked on, or done, before what was found for the first of them is taken."""
 
 
 class Executor(Protocol):
@@ -135,11 +140,13 @@ def map_chunks(
             yield piece, one(piece)
             progress.at((number + 1) / len(slices))
         return
-    pool, ended = ThreadPoolExecutor(max(workers, 1)), False
+    pool, ended, left = ThreadPoolExecutor(max(workers, 1)), False, iter(slices)
     try:
-        futures = [pool.submit(one, piece) for piece in slices]
+        # Not all at once: what they find would stay in memory until it is asked for.
+        futures = deque(pool.submit(one, piece) for piece in islice(left, AHEAD * max(workers, 1)))
         for number, piece in enumerate(slices):
-            yield piece, _result(futures[number], progress, number / len(slices), abort is not None)
+            yield piece, _result(futures.popleft(), progress, number / len(slices), abort is not None)
+            futures.extend(pool.submit(one, piece) for piece in islice(left, 1))
             progress.at((number + 1) / len(slices))
         ended = True
     finally:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import weakref
+
+import numpy as np
 import pytest
 
 from radiosity_addon.base.progress import SILENT, Cancelled, Expected, Progress, Status
 from radiosity_addon.numerics import map_chunks
+from radiosity_addon.numerics.parallel import AHEAD
 from tests.watched import noting, watching
 
 
@@ -84,6 +88,19 @@ def test_a_canceled_job_leaves_the_other_chunks_out(threads: int) -> None:
     with pytest.raises(Cancelled):
         list(map_chunks(lambda rows: done.append(rows.start), 1000, 1, threads, Progress(cancel)))
     assert 1 <= len(done) < 1000
+
+
+def test_what_was_taken_of_chunks_is_not_kept() -> None:
+    threads, alive, most = 2, weakref.WeakValueDictionary[int, np.ndarray](), 0
+
+    def found(rows: slice) -> np.ndarray:
+        alive[rows.start] = array = np.zeros(1)
+        return array
+
+    for _rows, array in map_chunks(found, 1000, 1, threads):
+        del array
+        most = max(most, len(alive))
+    assert 0 < most <= AHEAD * threads
 
 
 def test_canceling_is_no_error_that_work_could_handle() -> None:
