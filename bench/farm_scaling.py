@@ -12,14 +12,16 @@ import heapq
 import json
 import tempfile
 import time
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 from radiosity_addon.farm import Spool, shared_bake
-from radiosity_addon.farm.recent import Recent
 from radiosity_addon.farm.tasks import read_kernel, values_of
+from radiosity_addon.farm.worker import KEPT_CALLS
 
 from . import pictures
 from .compare import say
@@ -72,7 +74,9 @@ class RecordingSpool(Spool):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.rows: list[dict[str, Any]] = []
-        self._known: Recent[Any] = Recent()
+        # As workers do.
+        self._known: WeakValueDictionary[str, Any] = WeakValueDictionary()
+        self._kept: deque[Any] = deque(maxlen=KEPT_CALLS)
         self._worker: Spool | None
         self._digest, self._worker = "", None
         self._opened = self._closed = time.process_time()
@@ -92,7 +96,7 @@ class RecordingSpool(Spool):
         row["whole"] = now - self._opened
         self._worker = self._worker or Spool.to_work(self.path)
         now = time.process_time()
-        read_kernel(self._worker, digest, self._known)
+        self._kept.append(read_kernel(self._worker, digest, self._known))
         row["read"] = time.process_time() - now
         row["take"] = []
         for task in range(len(self.done(digest))):
