@@ -16,7 +16,9 @@ import bpy
 from tests.blender import hand_bake
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
-def look():
+def look(samples=1):
+    # All that is seen has one color; transparency is dithered.
+    bpy.context.scene.eevee.taa_render_samples = samples
     print("seen", *hand_bake.seen_from_above(Path(sys.argv[1]), 8, engine)[4, 4])
 """
 

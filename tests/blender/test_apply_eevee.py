@@ -29,15 +29,15 @@ SHINE = """
 from radiosity_addon.blender.datablocks import bake_record
 from tests.blender.scenes import add_lamp
 bake_record.register()
-for inputs in dict(Specular_IOR_Level=0.0, Alpha=0.5), dict(Metallic=1.0, Roughness=0.5):
+for inputs, samples in (dict(Specular_IOR_Level=0.0, Alpha=0.5), 16), (dict(Metallic=1.0, Roughness=0.5), 1):
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     hand_bake.add_plane(material=hand_bake.principled_material(**inputs))
     hand_bake.bake_by_hand(folder=Path(sys.argv[1]), show="shine")
-    look()
+    look(samples)
     add_lamp("SUN", energy=3.0, use_shadow=False)
-    look()
+    look(samples)
     hand_bake.show_lightmaps("matte")
-    look()
+    look(samples)
 """
 
 
