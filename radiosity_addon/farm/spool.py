@@ -182,6 +182,8 @@ class Spool(SpoolStore):
         """Write a call, and show it as the one that waits; return its digest."""
         digest = digest_of(text)
         folder = self._at("calls", digest)
+        if folder.parent.is_symlink():
+            raise linked(folder.parent)
         with explained(self.path):
             if folder.is_symlink():
                 folder.unlink()

@@ -95,6 +95,15 @@ def test_nothing_is_written_or_removed_through_links(spool: Spool, tmp_path: Pat
     assert (spool.path / "arrays" / f"{digest}.npy").exists() == (name == "arrays")
 
 
+def test_no_call_is_put_through_a_link(spool: Spool, tmp_path: Path) -> None:
+    outside = tmp_path / "outside"
+    (spool.path / "calls").rename(outside)
+    (spool.path / "calls").symlink_to(outside)
+    with pytest.raises(BakeError, match="calls' is a link out of the spool: remove it"):
+        spool.put_call("{}")
+    assert list(outside.iterdir()) == []
+
+
 def test_an_array_stays_for_a_while(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(published, "GRACE", 60.0)
     store = PublishedArrays(spool)
