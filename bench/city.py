@@ -2,7 +2,7 @@
 
 A city of 2.2 million triangles is baked on 16 pages of 2048² at draft, by a process of two threads and
 one worker. What is kept: their time, the most memory of their own that each takes, the spool's size, and
-what each kernel read and found. It takes more than an hour, and 45 GB of temporary files besides the folder.
+what each kernel read and found. It takes more than an hour, and 40 GB of temporary files besides the folder.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def measure(folder: Path, settings: dict[str, Any]) -> dict[str, Any]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="empty, with room for 30 GB")
+    parser.add_argument("folder", type=Path, help="empty, with room for 35 GB")
     parser.add_argument("--houses", type=int, default=18, help="along a side")
     parser.add_argument("--pages", type=int, default=16)
     parser.add_argument("--resolution", type=int, default=2048)
