@@ -28,8 +28,8 @@ BELOW_ONE = 1.0 - 2.0**-24
 LEAST_DOUBT = 0.05
 """Standard deviation of what a point sees of a lamp, at least, however sure its surroundings are."""
 
-BLOCK_PAIRS = 1 << 16
-"""Pairs of point and lamp evaluated at a time: their temporaries stay in the processor's cache."""
+BLOCK_PAIRS = 1 << 17
+"""Pairs of point and lamp evaluated at a time; bounds the temporaries to about 10 MB a thread."""
 
 
 @dataclass(frozen=True)

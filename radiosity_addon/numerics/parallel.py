@@ -4,8 +4,9 @@ A kernel is a function of a module: it takes what it reads and, last, a slice of
 found for these rows. It writes nothing. Callers pass it as `partial(kernel, …)`.
 
 The chunks do not depend on the number of threads, so the result is the same bytes whatever the machine. NumPy
-and embreex release the GIL, so threads are enough. Within `run_by` an executor may have other processes, also
-on other machines, run a kernel's chunks.
+and embreex release the GIL, so threads are enough, as long as arrays are large: on a few thousand numbers at
+a time two threads are no faster than one (docs/decisions/0065-chunks-for-threads.md). Within `run_by` an
+executor may have other processes, also on other machines, run a kernel's chunks.
 """
 
 from __future__ import annotations
@@ -30,7 +31,13 @@ T = TypeVar("T")
 POLL = 0.1
 """Seconds between looks for cancelation."""
 
-AHEAD = 8
+TOGETHER = 4
+"""Slices are as many as a multiple of this, of one size: a few threads end at about the same time."""
+
+SMALLEST = 16
+"""Slices are no smaller than a chunk by this: they would take longer to hand out than to work on."""
+
+AHEAD = 4
 """Slices a thread that are worked on, or done, before what was found for the first of them is taken."""
 
 
@@ -156,7 +163,9 @@ def map_chunks(
 
 
 def _slices(rows: int, chunk: int) -> list[slice]:
-    return [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
+    count = TOGETHER * max(-(-rows // (TOGETHER * chunk)), 1)
+    size = max(-(-rows // count), -(-chunk // SMALLEST))
+    return [slice(start, min(start + size, rows)) for start in range(0, rows, size)]
 
 
 def _elsewhere(

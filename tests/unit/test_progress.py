@@ -9,7 +9,7 @@ import pytest
 
 from radiosity_addon.base.progress import SILENT, Cancelled, Expected, Progress, Status
 from radiosity_addon.numerics import map_chunks
-from radiosity_addon.numerics.parallel import AHEAD
+from radiosity_addon.numerics.parallel import AHEAD, SMALLEST, TOGETHER
 from tests.watched import noting, watching
 
 
@@ -74,8 +74,22 @@ def test_what_work_shows_is_seen_and_nothing_looks_if_nobody_listens() -> None:
 def test_chunks_come_in_order_with_their_slices_and_fractions(threads: int) -> None:
     noted: list[Status] = []
     found = list(map_chunks(lambda rows: rows.start, 10, 4, threads, noting(noted)))
-    assert found == [(slice(0, 4), 0), (slice(4, 8), 4), (slice(8, 10), 8)]
-    assert fractions(noted) == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert found == [(slice(0, 3), 0), (slice(3, 6), 3), (slice(6, 9), 6), (slice(9, 10), 9)]
+    assert fractions(noted) == pytest.approx([0.25, 0.5, 0.75, 1.0])
+
+
+@pytest.mark.parametrize("rows", [0, 1, 7, 999, 1000, 4000, 4001, 5200, 100_000])
+def test_chunks_are_of_one_size_and_a_few_threads_share_them_evenly(rows: int) -> None:
+    chunk = 1000
+    sizes = [part.stop - part.start for part, _ in map_chunks(lambda _: None, rows, chunk, 1)]
+    assert sum(sizes) == rows
+    assert max(sizes, default=0) <= chunk
+    assert sizes[:-1] == sizes[:1] * len(sizes[:-1])
+    if rows >= chunk:
+        # No thread of TOGETHER has a slice more than another, but for what rounding leaves of the last.
+        assert len(sizes) % TOGETHER == 0
+    else:
+        assert len(sizes) <= min(TOGETHER, -(-rows * SMALLEST // chunk))
 
 
 @pytest.mark.parametrize("threads", [1, 3])

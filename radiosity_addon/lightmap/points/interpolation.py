@@ -36,8 +36,8 @@ BESIDE = 0.7
 """Points that lie on one side of a texel, so many texels away in the mean, support it half as much as points
 around it: a strip with but one row of points would look alike all across."""
 
-CHUNK = 1 << 13
-"""Texels whose neighbors are weighed at once; bounds the temporaries to some 40 MB a thread."""
+CHUNK = 1 << 14
+"""Texels whose neighbors are weighed at once; bounds the temporaries to some 80 MB a thread."""
 
 
 class GatherPoints:

@@ -37,8 +37,8 @@ BIAS = 2.0
 BAND = 1 << 20
 """Pixels whose texels are placed at once; bounds the temporaries to 20 MB."""
 
-CHUNK = 1 << 14
-"""Texels smoothed at once; bounds the temporaries to about 10 MB a thread."""
+CHUNK = 1 << 15
+"""Texels smoothed at once; bounds the temporaries to about 20 MB a thread."""
 
 _STEPS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
 """(8, 2): rows and columns from a texel to its neighbors."""

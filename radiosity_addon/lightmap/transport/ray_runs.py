@@ -29,7 +29,7 @@ EVEN = 0.25
 
 GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
-CHUNK = 1 << 13
+CHUNK = 1 << 14
 """Points whose neighbors are looked up at once."""
 
 Values = Callable[[Array], Array]

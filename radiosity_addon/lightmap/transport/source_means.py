@@ -10,8 +10,8 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, across, fill_chunks, map_chunks, tiles
 
-CHUNK_HITS = 1 << 18
-"""Hits averaged at once: their values stay in the processor's cache."""
+CHUNK_HITS = 1 << 19
+"""Hits averaged at once; bounds the temporaries to about 12 MB a thread."""
 
 MANY_CHANGED = 0.1
 """If more than this part of the table changed, all rows are computed again."""

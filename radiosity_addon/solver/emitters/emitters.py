@@ -35,11 +35,10 @@ FAR = 10.0
 """… of more only those that are nearer than this many of their radii, or cut by the horizon. The others send
 like a disk of their area: of a face that looks this small the form factor is off by less than 1 %."""
 
-BLOCK_PAIRS = 1 << 16
-"""Point and face pairs evaluated in single precision at a time: their temporaries stay in the processor's
-cache."""
+BLOCK_PAIRS = 1 << 17
+"""Point and face pairs evaluated in single precision at a time; their temporaries take some ten MB."""
 
-CHUNK_POINTS = 1 << 12
+CHUNK_POINTS = 1 << 14
 """Points that go down a tree of faces at once: each of them visits some hundred nodes."""
 
 ROUNDED = 1e-5

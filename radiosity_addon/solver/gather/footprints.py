@@ -26,8 +26,8 @@ from ..emitters import EmitterGroup
 SPREAD = 4
 """Points of each footprint that all lamps share."""
 
-CHUNK_POINTS = 1 << 14
-"""Footprints worked on at once; bounds the temporaries to about 20 MB a thread."""
+CHUNK_POINTS = 1 << 15
+"""Footprints worked on at once; bounds the temporaries to about 40 MB a thread."""
 
 SAME_GAIN = 0.02
 """Where a lamp gives the center of a footprint what it gives its farthest point, up to this

@@ -23,8 +23,11 @@ RUNS, MOST_RUNS = 64, 128
 """Runs of lamps, for each ray that few lamps would get, and at most: what a cell keeps, and its rays, do not
 grow with the number of lamps."""
 
-BLOCK_PAIRS = 1 << 16
-"""Pairs of point and lamp evaluated at a time: their temporaries stay in the processor's cache."""
+BLOCK_PAIRS = 1 << 17
+"""Pairs of point and lamp evaluated at a time; bounds the temporaries to about 10 MB a thread."""
+
+SAME_LAMPS = 1 << 14
+"""Points in a row that choose from the same lamps of a run."""
 
 ASKED = 8
 """Lamps of a run that a point chooses from, about."""
@@ -166,10 +169,24 @@ def _seen_of_run(
 ) -> Array:
     """Return (r,) or (r, 3) uint8 what points see of lamps, by a ray to one of them, chosen by what it adds.
 
-    tables: The run's lamps, in parts: all points of a chunk choose from one of these.
+    tables: The run's lamps, in parts: `SAME_LAMPS` points in a row choose from one of these.
     run: Chooses the point of the footprint that the ray starts from.
     """
-    at, table = spread.at, tables[part.start // CHUNK_POINTS % len(tables)]
+    pieces = range(part.start // SAME_LAMPS, -(-part.stop // SAME_LAMPS))
+    return np.concatenate([
+        _seen_of_lamps(
+            caster, tables[piece % len(tables)], spread, run, seed,
+            slice(max(piece * SAME_LAMPS, part.start), min((piece + 1) * SAME_LAMPS, part.stop)),
+        )
+        for piece in pieces
+    ])  # fmt: skip
+
+
+def _seen_of_lamps(
+    caster: RayCaster, table: LampTable, spread: SpreadPoints, run: int, seed: int, part: slice
+) -> Array:
+    """Return the same of points that choose from one table."""
+    at = spread.at
     center, normal, keys = at.points[part], at.normals[part], at.keys[part]
     place = stratified_square(keys, 1, seed + Stream.SHADOW_RAYS)[:, 0]
     choice = stratified_square(keys, 1, seed + Stream.SHADOW_STARTS)[:, 0, :1]
