@@ -112,15 +112,22 @@ class ShadowShare:
         return many
 
     def _share(self, rows: Array | slice = slice(None)) -> Array:
+        """Return the share as far as it is known: all, where no ray that was asked carries light."""
         total = self._total[rows]
-        return np.asarray((self._lit[rows].T / np.where(total > 0, total, 1.0)).T)
+        share = np.asarray((self._lit[rows].T / np.where(total > 0, total, 1.0)).T)
+        share[total == 0] = 1.0
+        return share
 
     def _is_partial(self, rows: Array | slice) -> Array:
-        """Return which rows' shares are neither none nor all."""
+        """Return which rows' shares are neither none nor all, or not known.
+
+        Where a glowing face goes through a footprint, all rays that were asked may start behind it.
+        """
+        unknown = self._total[rows] == 0.0
         if self._uneven is not None:
-            return np.asarray(self._uneven[rows])
+            return np.asarray(self._uneven[rows] | unknown)
         share = self._share(rows)
-        return np.asarray((share > 1e-6) & (share < 1 - 1e-6))
+        return np.asarray(((share > 1e-6) & (share < 1 - 1e-6)) | unknown)
 
     def _shadow(self, rows: Array, counts: Array, progress: Progress) -> None:
         """Ask `counts[row]` shadow rays a row, in place of those asked before."""
@@ -190,7 +197,11 @@ def spread_rays(
     center, normal = at.points[chunk], at.normals[chunk]
     directions, distances, weights = aimed
     # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
-    weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
+    dark = ~weights.any(axis=1)
+    if isinstance(light, EmitterGroup):
+        # Where the center gets light, these rays have only missed what sends it.
+        dark[dark] = light.unit_irradiance(center[dark], normal[dark]) == 0.0
+    weights = np.where(dark[:, None], 1.0, weights)
     start = center[:, None]
     if at.sampler is not None:
         # The same lamp points, seen from points spread over the footprint.
