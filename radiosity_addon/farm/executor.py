@@ -21,7 +21,7 @@ from .signs import giving_signs, this_process
 from .spool import Spool
 from .tasks import is_kernel, run_task, task_count, values_of
 
-FEWEST = 8
+FEWEST = 4
 """Slices of a kernel that is given away, at least: fewer are done here before others have read what they
 need."""
 

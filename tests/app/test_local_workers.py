@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from radiosity_addon.blender.command_line.main import main
-from radiosity_addon.farm import LocalWorkers, Spool, executor, local_workers
+from radiosity_addon.farm import LocalWorkers, Spool, local_workers
 from radiosity_addon.farm.processes import HelpingProcess
 from radiosity_addon.farm.signs import SILENCE, this_process
 from tests.moments import until
@@ -31,9 +31,6 @@ waits_to_go()
 leave(main(sys.argv[1:]), TemporaryFolder())
 """
 
-FEW = 4
-"""Slices of calls that are shared here: a small page's have no more."""
-
 LINUX = pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="no list of processes here")
 
 
@@ -43,11 +40,6 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     folder = tmp_path_factory.mktemp("alone")
     assert main([*BAKE, "--output", str(folder)]) == 0
     return (folder / "lightmap.exr").read_bytes()
-
-
-@pytest.fixture(autouse=True)
-def few_slices_are_shared(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executor, "FEWEST", FEW)
 
 
 @pytest.fixture(autouse=True)
@@ -106,9 +98,7 @@ def kill_workers(monkeypatch: pytest.MonkeyPatch, count: int) -> set[int]:
 
 def waits_to_go() -> None:
     """Have the bake of this process leave its first tasks to workers, until there is a file "go"."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(executor, "FEWEST", FEW)
-    each_call(patch, lambda spool, _: until((spool.path / "go").exists))
+    each_call(pytest.MonkeyPatch(), lambda spool, _: until((spool.path / "go").exists))
 
 
 def test_the_bake_starts_workers_and_a_spool(

@@ -17,7 +17,7 @@ from radiosity_addon.blender.jobs import farm
 from radiosity_addon.blender.jobs.farm import ended_with, farm_of
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.settings.preferences import Defaults, RADIOSITY_AP_preferences
-from radiosity_addon.farm import FarmCommand, Spool, executor, output_spool
+from radiosity_addon.farm import FarmCommand, Spool, output_spool
 from radiosity_addon.farm.farm_command import split
 from radiosity_addon.options import BakeSettings
 from tests.moments import until
@@ -43,8 +43,6 @@ def preferred(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespac
     chosen = SimpleNamespace(farm_command=command, spool_folder=str(tmp_path / "my spools"), note=note)
     (tmp_path / "my spools").mkdir()
     monkeypatch.setattr(farm, "preferences", lambda _context: chosen)
-    # A small page's calls have few slices.
-    monkeypatch.setattr(executor, "FEWEST", 4)
     return chosen
 
 
