@@ -197,11 +197,7 @@ def spread_rays(
     center, normal = at.points[chunk], at.normals[chunk]
     directions, distances, weights = aimed
     # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
-    dark = ~weights.any(axis=1)
-    if isinstance(light, EmitterGroup):
-        # Where the center gets light, these rays have only missed what sends it.
-        dark[dark] = light.unit_irradiance(center[dark], normal[dark]) == 0.0
-    weights = np.where(dark[:, None], 1.0, weights)
+    weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
     start = center[:, None]
     if at.sampler is not None:
         # The same lamp points, seen from points spread over the footprint.
