@@ -10,6 +10,7 @@
     baking                   which process bakes
     over                     the bake has ended
     prepared                 the digest of the bake that was prepared (`prepared.py`), as an object
+    begun                    the digest of the inputs that were baked last
     results/DIGEST           the digest of what a bake of these inputs found (`stored_result.py`)
     finished                 the folder that the prepared bake was finished into
 
@@ -36,7 +37,7 @@ from .spool_store import Array, SpoolStore, explained, linked, not_written
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
 
-RECORD, PREPARED, FINISHED = "spool.json", "prepared", "finished"
+RECORD, PREPARED, BEGUN, FINISHED = "spool.json", "prepared", "begun", "finished"
 
 _FOLDERS = ("arrays", "objects", "calls", "results", "aside")
 _OURS = re.compile(
@@ -307,7 +308,7 @@ class Spool(SpoolStore):
             self.say_over()  # as long as the disk is not full
         with contextlib.suppress(OSError):
             self._empty()
-        for name in ("open", "baking", "over", PREPARED, FINISHED, RECORD):
+        for name in ("open", "baking", "over", PREPARED, BEGUN, FINISHED, RECORD):
             with contextlib.suppress(OSError):
                 (self.path / name).unlink()
         with contextlib.suppress(OSError):

@@ -21,7 +21,7 @@ from .helpers import Helpers
 from .pipeline_sharing import shared_pipeline
 from .prepared import UNREADABLE, BakeInputs, PreparedBake
 from .signs import giving_signs, other_baker, refuse_second_bake
-from .spool import FINISHED, PREPARED, Spool
+from .spool import BEGUN, FINISHED, PREPARED, Spool
 from .spool_store import explained
 from .stored_result import StoredResult, has_result, write_result
 
@@ -45,7 +45,7 @@ def stage_of(spool: Spool) -> Stage | None:
         return "ready to finish"
     if other_baker(spool.sign) is not None:
         return "running"
-    return "interrupted" if spool.has_results() else "prepared"
+    return "interrupted" if spool.pointer(BEGUN) == prepared.inputs else "prepared"
 
 
 def store_prepared(spool: Spool, inputs: BakeInputs, prepared: PreparedBake) -> bool:
@@ -75,6 +75,7 @@ def bake_prepared(
     """
     keeping = KeepOptions(sidecar=True) if inputs.keep else None
     plan = plan_bake(inputs.bake_scene, inputs.settings, None, None)
+    spool.point(BEGUN, digest)
     baking = shared_pipeline(partial(shared_bake, spool, helpers, emptied=False))
     with nullcontext() if keeping is None else spool.aside() as sidecar:
         result, kept = baking(plan, keeping, sidecar, progress)
@@ -115,8 +116,9 @@ def say_finished(spool: Spool, output: Path) -> None:
     Raises BakeError if the spool cannot be written to.
     """
     spool.note(FINISHED, str(output.expanduser().resolve()))
-    with explained(spool.path), suppress(FileNotFoundError):
-        (spool.path / PREPARED).unlink()
+    for name in (PREPARED, BEGUN):
+        with explained(spool.path), suppress(FileNotFoundError):
+            (spool.path / name).unlink()
     spool.end()
 
 
