@@ -114,7 +114,7 @@ def main() -> None:
         parser.error(f"'{chosen.folder}' is not empty: give another folder")
     build(chosen.folder / "city.blend", chosen.houses)
     settings = {"pages": chosen.pages, "resolution": chosen.resolution, "quality": "draft", "threads": 2,
-                "memory_limit": 7}  # fmt: skip
+                "memory_limit": 6}  # fmt: skip
     found = measure(chosen.folder, settings)
     found = {"case": "city", "houses": chosen.houses, "settings": settings, **found, "context": context(2)}
     say(str(write(found, RESULTS)))

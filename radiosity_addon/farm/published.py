@@ -22,7 +22,7 @@ Array = npt.NDArray[Any]
 WORTH_KNOWING = 1 << 16
 """Bytes of arrays whose digests are remembered: those of smaller ones take no time."""
 
-GRACE = 60.0
+GRACE = 20.0
 """Seconds that an array stays in the spool at least: a worker may still be at a task of the last call."""
 
 
