@@ -21,7 +21,7 @@ from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materia
 from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas
 from ..lights import grouped
-from ..numerics import Array, Scratch, give_back, tiles
+from ..numerics import Array, Scratch, give_back, one_blas_thread, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
@@ -111,6 +111,7 @@ def bake_and_keep(
     return result, kept
 
 
+@one_blas_thread()
 def _bake(
     bake_scene: BakeScene, settings: BakeSettings, keep: bool, progress: Progress
 ) -> tuple[BakeResult, KeptBake | None]:

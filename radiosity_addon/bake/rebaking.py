@@ -13,7 +13,7 @@ import numpy as np
 from ..base import SILENT, BakeWarning, Progress, SceneError
 from ..lightmap.lighting import light_texels, lit_as_texels
 from ..lightmap.update import AffectedTexels, PreviousLight
-from ..numerics import Array
+from ..numerics import Array, one_blas_thread
 from ..scene import BakeObject, BakeScene, Scene
 from ..solver.moved_elements import carried
 from .pipeline import TexelValues, baked_objects, finish
@@ -29,6 +29,7 @@ LIT = 0.97
 """How far the whole is when texels are lit; rough."""
 
 
+@one_blas_thread()
 def bake_moved(
     kept: KeptBake, bake_scene: BakeScene, progress: Progress = SILENT
 ) -> tuple[BakeResult, KeptBake]:

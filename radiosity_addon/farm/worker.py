@@ -12,6 +12,7 @@ from weakref import WeakValueDictionary
 
 from ..base import BakeError
 from ..cli import quoted
+from ..numerics import one_blas_thread
 from .objects import ObjectError
 from .signs import BakeWatch
 from .spool import RECORD, Spool
@@ -39,6 +40,7 @@ def wait_for(path: Path, seconds: float) -> Spool:
     return spool
 
 
+@one_blas_thread()
 def work(
     spool: Spool,
     idle: float = math.inf,
@@ -100,6 +102,7 @@ def open_tasks(spool: Spool) -> list[str]:
     return [f"{digest}-{task}" for task in range(count) if task not in begun]
 
 
+@one_blas_thread()
 def do_task(spool: Spool, name: str) -> None:
     """Do one task of the open call, also if somebody has begun it: who has may be gone.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .arrays import Array
 from .bilinear import texels_around
+from .blas import one_blas_thread
 from .curve import along_curve
 from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .heap import give_back
@@ -109,6 +110,7 @@ __all__ = [
     "marked",
     "most_reflectance",
     "numbered",
+    "one_blas_thread",
     "orthonormal_basis",
     "pick_in_rows",
     "pick_in_runs",

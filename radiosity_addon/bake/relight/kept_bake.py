@@ -20,7 +20,7 @@ from ...lightmap.lighting import estimated_error, kept_bytes, relight_texels
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.transport import LightingRecord, RelightableTexels, TexelLight
 from ...lightmap.unwrap import Atlas
-from ...numerics import Array, Scratch, tiles
+from ...numerics import Array, Scratch, one_blas_thread, tiles
 from ...options import BakeSettings
 from ...scene import BakeScene
 from ...solver.element_transport import Relightable
@@ -133,6 +133,7 @@ class KeptBake:
         return scene_record(self.bake_scene, self.settings, self.geometry.uv)
 
 
+@one_blas_thread()
 def relight_pages(kept: KeptBake, strengths: Array, progress: Progress = SILENT) -> tuple[LightmapPage, ...]:
     """Compute the lightmaps for other strengths of the sources.
 
