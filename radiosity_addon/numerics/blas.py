@@ -10,7 +10,7 @@ from functools import cache
 from threading import Lock
 from typing import Any
 
-_NAMES = ("openblas_{}_num_threads64_", "scipy_openblas_{}_num_threads64_", "openblas_{}_num_threads")
+NAMES = ("openblas_{}_num_threads64_", "scipy_openblas_{}_num_threads64_", "openblas_{}_num_threads")
 
 _lock = Lock()
 _inside = [0]
@@ -25,7 +25,7 @@ def one_blas_thread() -> Iterator[None]:
     busily for the next: a sixth of a bake's processor time on two cores (decision 0065). Where NumPy links
     something else, nothing is changed.
     """
-    known = _thread_functions()
+    known = thread_functions()
     if known is None:
         yield
         return
@@ -45,14 +45,14 @@ def one_blas_thread() -> Iterator[None]:
 
 
 @cache
-def _thread_functions() -> tuple[Callable[[], int], Callable[[int], Any]] | None:
+def thread_functions() -> tuple[Callable[[], int], Callable[[int], Any]] | None:
     """Return what gets and what sets the number of OpenBLAS's threads; None if NumPy is not linked to it.
 
     Windows does not look for functions in what a library is linked to, so none are found there.
     """
     with suppress(ImportError, OSError, TypeError):
         library = ctypes.CDLL(importlib.import_module("numpy.linalg._umath_linalg").__file__)
-        for name in _NAMES:
+        for name in NAMES:
             with suppress(AttributeError):
                 return getattr(library, name.format("get")), getattr(library, name.format("set"))
     return None

@@ -17,7 +17,7 @@ from tests.unit.texel_scenes import bake_scene
 @pytest.fixture
 def threads():
     """What gets and what sets the number of threads, which is 3 during the test."""
-    functions = blas._thread_functions()
+    functions = blas.thread_functions()
     if functions is None:
         pytest.skip("NumPy is not linked to OpenBLAS here")
     before = functions[0]()
@@ -63,13 +63,13 @@ def test_it_lasts_until_the_last_of_several_threads_leaves(threads) -> None:
 
 def test_other_librarys_names_change_nothing(monkeypatch: pytest.MonkeyPatch, threads) -> None:
     get, _ = threads
-    monkeypatch.setattr(blas, "_NAMES", ("no_such_{}",))
-    blas._thread_functions.cache_clear()
+    monkeypatch.setattr(blas, "NAMES", ("no_such_{}",))
+    blas.thread_functions.cache_clear()
     try:
         with one_blas_thread():
             assert get() == 3
     finally:
-        blas._thread_functions.cache_clear()
+        blas.thread_functions.cache_clear()
 
 
 def test_a_bake_has_one(threads) -> None:
