@@ -72,9 +72,12 @@ def bpy_environment(root: Path, bpy: str) -> Environment:
 
 
 def quick_environment(root: Path) -> Environment:
-    """`.envs/quick`, which runs the tests that need neither bpy nor a window."""
+    """`.envs/quick`, which runs the tests that need neither bpy nor a window.
+
+    Its Python is the newest that is here, and NumPy with it: the main environment may have older ones.
+    """
     folder = root / ".envs" / "quick"
-    version = _python_version(folder) or sys.version_info[:2]
+    version = _python_version(folder) or system.newest_python(BPY_OF_PYTHON)
     return _ready(root, folder, [root / "requirements" / "quick.txt"], version, with_blender=False)
 
 

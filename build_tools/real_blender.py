@@ -86,7 +86,9 @@ class RealBlender:
             "BLENDER_USER_RESOURCES": self.inside(resources),
             **(environment or {}),
         }
-        screen = ["xvfb-run", "--auto-servernum", f"--server-args={SCREEN}"] if window else []
+        # Two that start at once and look for a free number from the same one on may find the same.
+        first = f"--server-num={99 + os.getpid() % 400}"
+        screen = ["xvfb-run", first, "--auto-servernum", f"--server-args={SCREEN}"] if window else []
         return enter(self.root, [*screen, "blender", *arguments], variables, timeout)
 
 

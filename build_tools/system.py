@@ -6,6 +6,8 @@ import ctypes
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from .errors import BuildError
@@ -53,6 +55,20 @@ def find_python(version: tuple[int, int]) -> str:
         if version_of(python) == version:
             return python
     raise BuildError(f"no {name} found; install it (Debian: apt-get install -y {name} {name}-venv, or pyenv)")
+
+
+def newest_python(versions: Iterable[tuple[int, int]]) -> tuple[int, int]:
+    """Return the newest of these versions that is here.
+
+    Raises BuildError if none of them is.
+    """
+    newest_first = sorted(versions, reverse=True)
+    for version in newest_first[:-1]:
+        with suppress(BuildError):
+            find_python(version)
+            return version
+    find_python(newest_first[-1])
+    return newest_first[-1]
 
 
 def version_of(python: str) -> tuple[int, int] | None:

@@ -22,8 +22,11 @@ from .scenes import SCENES
 
 ROOT = Path(__file__).resolve().parents[2]
 
+IN_EVERY_BLENDER = 10
+"""Scenes that every run tries, …"""
+
 FIRST = 40
-"""Scenes that every run tries."""
+"""… and those that one with Blender 5.0 tries."""
 
 BAKED_SEED = 17
 """Its scene can be baked."""
@@ -35,9 +38,13 @@ BRIGHT_VARIANTS: tuple[dict[str, int], ...] = ({"seed": 4}, {"padding": 6}, {"re
 LAYERED = (20017,)
 """Seeds whose faces lie in one another and once made light."""
 
-BLOCKS = [(0, FIRST), *((start, min(start + 100, SCENES)) for start in range(FIRST, SCENES, 100))]
-"""Seeds of each test. All but the first repeat its checks with other scenes, a minute of both cores each:
-they run with `build.py test --full`, and `build.py fuzz` tries more."""
+BLOCKS = [
+    (0, IN_EVERY_BLENDER),
+    (IN_EVERY_BLENDER, FIRST),
+    *((start, min(start + 100, SCENES)) for start in range(FIRST, SCENES, 100)),
+]
+"""Seeds of each test. Those after the second repeat its checks with other scenes, a minute of both cores
+each: they run with `build.py test --full`, and `build.py fuzz` tries more."""
 
 TIMEOUT = 500
 """Seconds; on an idle machine a block takes a seventh of it."""
@@ -45,7 +52,11 @@ TIMEOUT = 500
 
 @pytest.mark.parametrize(
     ("first", "last"),
-    [pytest.param(*block, marks=[pytest.mark.full] if block[0] else []) for block in BLOCKS],
+    [
+        BLOCKS[0],
+        pytest.param(*BLOCKS[1], marks=pytest.mark.one_blender),
+        *(pytest.param(*block, marks=pytest.mark.full) for block in BLOCKS[2:]),
+    ],
 )
 def test_random_scenes(first: int, last: int) -> None:
     """Processes share the seeds; one that Blender takes down with it is told by its exit code."""
@@ -74,6 +85,7 @@ def test_random_scenes(first: int, last: int) -> None:
     assert baked > 0.7 * (last - first)
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("seed", LAYERED)
 def test_layers_make_no_light(seed: int) -> None:
     """In one process each: Blender's own end may hang while our classes are registered."""
@@ -82,6 +94,7 @@ def test_layers_make_no_light(seed: int) -> None:
     assert done.returncode == 0, (done.stdout + done.stderr)[-3000:]
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("changed", BRIGHT_VARIANTS, ids=str)
 def test_no_texel_runs_away_between_paint_and_glass(changed: dict[str, int]) -> None:
     """Paint that is added to colored transparency once reflected what passed as well."""
@@ -92,6 +105,7 @@ def test_no_texel_runs_away_between_paint_and_glass(changed: dict[str, int]) -> 
         radiosity_addon.unregister()
 
 
+@pytest.mark.one_blender
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The checks can fail: handed darkness below zero they say so."""
     real = page_assembly.fill

@@ -27,6 +27,7 @@ def test_blender_validates_every_zip(blender, zips, platform) -> None:
     assert "Success" in done.stdout
 
 
+@pytest.mark.timed
 def test_registering_is_quick_and_imports_nothing_heavy(installed: Installed) -> None:
     answer = installed.answer("registration_cost.py")
     assert answer["enabled"] == [True, True]

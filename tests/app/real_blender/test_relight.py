@@ -9,7 +9,7 @@ import pytest
 
 from tests.app.real_blender.installed import Installed
 
-pytestmark = pytest.mark.real_blender
+pytestmark = [pytest.mark.real_blender, pytest.mark.timed]
 
 
 @pytest.fixture(scope="module")
