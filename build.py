@@ -7,6 +7,8 @@ pinned versions of `requirements/`, later ones only check that the pins have not
 
 import os
 import sys
+from collections.abc import Callable
+from functools import partial
 
 SUPPORTED_PYTHONS = ((3, 11), (3, 13))
 
@@ -35,17 +37,21 @@ WITHOUT_BLENDER = ("tests/unit", "tests/analytic")
 LINT_IMPORTS = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 """import-linter has no module to run. Its contracts are in pyproject.toml."""
 
+ADD_ON_VERBS = ("bake", "prepare", "finish", "flip", "export", "restore")
+"""Verbs of the add-on's own command line."""
+
 USAGE = """\
 usage: python3 build.py VERB [arguments]
 
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
   prepare [SCENE] --spool DIR, finish [SCENE] --spool DIR --output DIR
                              the first and the last stage of a bake that is run without Blender in between
-  restore SCENE [options]    take a bake out of a .blend again
+  flip SCENE --output FILE   flip faces that show their backs and would be black
+  restore SCENE --output FILE  take a bake out of a .blend again
   export DIR [options]       export a bake for browsers and engines
   test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
-                             --quick: the fast ones that need neither bpy nor a window, in a minute, in an
-                             environment without bpy; --full: the slow ones too;
+                             --quick: the fast ones that need neither bpy nor a window, in an environment
+                             without bpy, of the newest Python that is here; --full: the slow ones too;
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
@@ -67,12 +73,8 @@ def main(arguments: list[str]) -> int:
         print(USAGE, end="")
         return 0 if arguments else 2
     verb, rest = arguments[0], arguments[1:]
-    verbs = {
-        "bake": bake,
-        "prepare": prepare,
-        "finish": finish,
-        "export": export,
-        "restore": restore,
+    verbs: dict[str, Callable[[list[str]], int]] = {
+        **{name: partial(run_add_on, name) for name in ADD_ON_VERBS},
         "test": test,
         "fuzz": fuzz,
         "bench": bench,
@@ -98,29 +100,9 @@ def main(arguments: list[str]) -> int:
         return 130
 
 
-def bake(arguments: list[str]) -> int:
-    """Bake with the command line of the add-on, which says where everything is."""
-    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "bake", *arguments)
-
-
-def prepare(arguments: list[str]) -> int:
-    """Prepare a bake with the command line of the add-on."""
-    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "prepare", *arguments)
-
-
-def finish(arguments: list[str]) -> int:
-    """Finish a bake that was prepared and run with the command line of the add-on."""
-    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "finish", *arguments)
-
-
-def export(arguments: list[str]) -> int:
-    """Export with the command line of the add-on."""
-    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "export", *arguments)
-
-
-def restore(arguments: list[str]) -> int:
-    """Restore with the command line of the add-on."""
-    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "restore", *arguments)
+def run_add_on(verb: str, arguments: list[str]) -> int:
+    """Hand over to the command line of the add-on, which says where everything is."""
+    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", verb, *arguments)
 
 
 def test(arguments: list[str]) -> int:
@@ -144,8 +126,9 @@ def test(arguments: list[str]) -> int:
     code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", f"not ({left_out})", *folders)
     if which in ("--quick", "--bpy"):
         return code
-    # Windows share one real Blender, of Debian's own version, and are timed: one after the other.
-    return environment.run("-m", "pytest", "-m", "real_blender") or code
+    # Windows share one real Blender, of Debian's own version.
+    code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", "real_blender and not timed") or code
+    return environment.run("-m", "pytest", "-m", "timed") or code
 
 
 def fuzz(arguments: list[str]) -> int:

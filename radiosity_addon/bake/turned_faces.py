@@ -51,6 +51,9 @@ MOSTLY = 0.5
 NO_AREA = 1e-12
 """Triangles without area count as so much of the largest: polygons of nothing else follow their part."""
 
+FLIPS = "Flip Faces in the panel, `flip` on the command line,"
+"""What flips the faces that a warning has found."""
+
 PROBED_AT_ONCE = 1 << 14
 """Triangles whose rays are traced together."""
 
@@ -89,8 +92,7 @@ def of_inside_out(bake_scene: BakeScene) -> list[BakeWarning]:
         if item.bake and inward > MAX_TURNED_SHARE * whole:
             message = (
                 f"object '{item.name}' is inside out on {inward / whole:.0%} of its surface: normals point "
-                "inward, so its lightmap is black there; use Flip Faces in the panel, or "
-                "Mesh → Normals → Recalculate Outside"
+                f"inward, so its lightmap is black there; use {FLIPS} or Mesh → Normals → Recalculate Outside"
             )
             polygons = tuple(np.unique(item.polygon[turned[item.rows]]).tolist())
             warnings.append(BakeWarning(item.name, message, turned=polygons))
@@ -178,7 +180,7 @@ def turned_away(
             reach = WITHIN * np.sqrt(np.bincount(part, area)[part[fine]])
             right[fine] = ~probe.hidden(item.first + fine, reach)
             polygons = turned_polygons(item, part, area, turned, unlit, right)
-            ways = "Flip Faces in the panel, or " * bool(polygons) + "Mesh → Normals → Flip"
+            ways = f"{FLIPS} or Mesh → Normals → Flip" if polygons else "Mesh → Normals → Flip"
             message = (
                 f"object '{item.name}' is lit from behind on {share:.0%} of its surface: normals point "
                 f"away from the light, so its lightmap is dark there; flip them ({ways}) if that side should "

@@ -14,6 +14,7 @@ from .parser import (
     build_parser,
     check_keeping,
     check_plot,
+    check_scene,
     check_sharing,
     requested_settings,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "check_folder",
     "check_keeping",
     "check_plot",
+    "check_scene",
     "check_sharing",
     "escaped",
     "fail",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..options import SUM_GROUPS, option, options_of
+from ..options import FORM_NAMES, SUM_GROUPS, option, options_of
 
 SECTION = "Command"
 
@@ -52,8 +52,8 @@ class _BakeCommand:
     )
     export: str | None = option(
         None,
-        "Also export into DIR/export, in one or more of these forms, separated by commas: web, glb, godot, "
-        "unity, bevy. Charts get 4 free pixels between them unless --padding or --mip-levels is given",
+        f"Also export into DIR/export, in one or more of these forms, separated by commas: {FORM_NAMES}. "
+        "Charts get 4 free pixels between them unless --padding or --mip-levels is given",
         SECTION,
         metavar="FORM,…",
     )
@@ -73,7 +73,7 @@ class _ExportCommand:
 
     forms: str = option(
         "web",
-        "What to write, separated by commas: web, glb, godot, unity, bevy",
+        f"What to write, separated by commas: {FORM_NAMES}",
         SECTION,
         metavar="FORM,…",
     )

@@ -23,6 +23,8 @@ from .command_options import (
 from .farm_spec import read_farm_spec
 from .path_checks import checked_folder, checked_name, checked_path
 
+SCENE_SUFFIXES = (".blend", ".glb", ".gltf", ".obj")
+
 BUNDLED_OUTPUT = Path("out/cornell")
 """Where the bundled scene goes when no --output is given."""
 
@@ -30,10 +32,11 @@ BUNDLED_OUTPUT = Path("out/cornell")
 def build_parser(prog: str) -> argparse.ArgumentParser:
     """Return the parser of all commands; it raises `UsageError` where argparse would exit."""
     parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,prepare,finish,export,restore}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="COMMAND")
     _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
     _add_prepare(verbs.add_parser("prepare", help="store a bake to run without Blender", allow_abbrev=False))
     _add_finish(verbs.add_parser("finish", help="show and write what such a bake found", allow_abbrev=False))
+    _add_flip(verbs.add_parser("flip", help="flip faces that show their backs", allow_abbrev=False))
     _add_export(verbs.add_parser("export", help="export a bake for engines", allow_abbrev=False))
     _add_restore(verbs.add_parser("restore", help="take the lightmaps out again", allow_abbrev=False))
     return parser
@@ -82,6 +85,13 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
         raise UsageError("--relight solves nothing, so --plot has no history to draw")
     if request.relight and request.check:
         raise UsageError("--check looks at a bake, not at --relight: give one of the two")
+
+
+def check_scene(request: argparse.Namespace, loaded: Path | None) -> None:
+    """Refuse a scene that was given where only names of objects can be."""
+    names = getattr(request, "objects", ())
+    if request.scene is None and loaded is None and names and names[-1].lower().endswith(SCENE_SUFFIXES):
+        raise UsageError(f"--objects takes all names after it, and so '{names[-1]}': give SCENE before it")
 
 
 def check_sharing(request: argparse.Namespace) -> None:
@@ -161,17 +171,24 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(forms=EXPORT_COMMAND["forms"].default)
 
 
+def _add_flip(parser: argparse.ArgumentParser) -> None:
+    _add_file_to_file(parser, ".blend, .glb, .gltf or .obj", "the .blend to write, with these faces flipped")
+
+
 def _add_restore(parser: argparse.ArgumentParser) -> None:
+    _add_file_to_file(parser, "a baked .blend", "the restored .blend to write")
+
+
+def _add_file_to_file(parser: argparse.ArgumentParser, scene: str, output: str) -> None:
+    """Add what makes another file of a scene."""
     parser.add_argument(
         "scene",
         nargs="?",
         type=checked_path,
         metavar="SCENE",
-        help="a baked .blend; without it the file Blender has open",
+        help=f"{scene}; without it the file Blender has open",
     )
-    parser.add_argument(
-        "--output", type=checked_path, required=True, metavar="FILE", help="the restored .blend to write"
-    )
+    parser.add_argument("--output", type=checked_path, required=True, metavar="FILE", help=output)
     _add_options(parser, EVERY_COMMAND.values())
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
 from .choices import EXPORT_FORMS
 from .constants import EFFICACY, MAX_GROUPS, MAX_PAGES, MAX_RESOLUTION, OTHERS, TEXEL_STEPS
-from .export_forms import ENGINE_PADDING, SUM_GROUPS, Form, forms_of
+from .export_forms import ENGINE_PADDING, FORM_NAMES, SUM_GROUPS, Form, forms_of
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Choice, Option, option, options_of, plain
 from .panel_settings import PANEL_OPTIONS, RELIGHT_GROUP
@@ -20,6 +20,7 @@ __all__ = [
     "ENGINE_PADDING",
     "EXPORT",
     "EXPORT_FORMS",
+    "FORM_NAMES",
     "GROUPS",
     "LAST_BAKE",
     "MAIN",

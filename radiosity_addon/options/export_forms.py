@@ -9,6 +9,9 @@ from .choices import EXPORT_FORMS
 
 ENGINES = ("godot", "unity", "bevy")
 
+FORM_NAMES = ", ".join(choice.value for choice in EXPORT_FORMS)
+"""All forms, for messages."""
+
 SUM_GROUPS = (
     "Export light groups only as their sum, as the sliders stand; else also a lightmap of each, which "
     "viewer.html mixes"
@@ -59,7 +62,6 @@ def forms_of(text: str, sum_groups: bool = False) -> Form:
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     unknown = [name for name in names if name not in known]
     if unknown or not names:
-        raise UsageError(
-            f"forms to export '{text}': give one or more of {','.join(known)}, separated by commas"
-        )
+        wrong = f"unknown form '{unknown[0]}'" if unknown else f"no form in '{text}'"
+        raise UsageError(f"{wrong}: export one or more of {FORM_NAMES}, separated by commas")
     return Form(names, sum_groups)

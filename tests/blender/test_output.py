@@ -15,7 +15,7 @@ from radiosity_addon.bake.result.report import BakeReport
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.files.output import OutputFolder
-from radiosity_addon.blender.files.saved_files import save_copy, save_restored
+from radiosity_addon.blender.files.saved_files import save_copy, save_scene
 from radiosity_addon.blender.images.images import set_folder, write_pages
 from radiosity_addon.files.baked_files import digest_of_file, read_report
 from radiosity_addon.files.file_names import BLEND_NAME, REPORT_NAME
@@ -298,7 +298,7 @@ def test_the_copy_finds_its_lightmaps_and_the_scene_s_pictures(tmp_path: Path, s
 
 def test_the_copy_is_compressed_and_replaces_an_older_one(tmp_path: Path) -> None:
     (tmp_path / "copy.blend").write_text("old")
-    save_restored(tmp_path / "copy.blend")
+    save_scene(tmp_path / "copy.blend")
     assert (tmp_path / "copy.blend").read_bytes()[:4] == bytes.fromhex("28b52ffd")  # Zstandard
     assert [path.name for path in tmp_path.iterdir()] == ["copy.blend"]
 
@@ -314,4 +314,4 @@ def test_the_scene_itself_is_never_overwritten(tmp_path: Path) -> None:
 
 def test_a_copy_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(BakeError, match=r"gone/copy\.blend"):
-        save_restored(tmp_path / "gone" / "copy.blend")
+        save_scene(tmp_path / "gone" / "copy.blend")

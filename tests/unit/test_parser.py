@@ -176,7 +176,12 @@ def test_restore(verbs: list[tuple]) -> None:
     [
         ("", "required"),
         ("paint", "paint"),
+        ("paint", "COMMAND"),
         ("bake a.blend", "--output"),
+        ("bake --output o --objects Wall a.glb", "'a.glb': give SCENE before it"),
+        ("bake --output o a.blend --export rgbm,foo", "unknown form 'foo': export one or more of web, glb,"),
+        ("bake --output o a.blend --export ,", "no form in ','"),
+        ("flip a.blend", "--output"),
         ("bake --output o a.blend extra", "extra"),
         ("bake --resolution 512 --texel-density 3 --output o", "not allowed with"),
         ("bake --resolution 0", "resolution 0"),

@@ -24,6 +24,7 @@ from ...cli import (
     build_parser,
     check_keeping,
     check_plot,
+    check_scene,
     check_sharing,
     fail,
     requested_settings,
@@ -34,7 +35,7 @@ from ...options import ENGINE_PADDING, BakeSettings, Form, forms_of
 if TYPE_CHECKING:
     from ...farm import PreparedBake
 
-STAGED = ("bake", "prepare", "finish")
+STAGED = ("bake", "prepare", "finish", "flip")
 """Verbs whose stages say when they may be interrupted."""
 
 EXIT_DONE = 0
@@ -64,6 +65,7 @@ def main(
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
         settings = requested_settings(request) if request.verb in ("bake", "prepare") else None
         if settings is not None:
+            check_scene(request, loaded)
             check_sharing(request)
         is_written = request.verb == "finish" or (request.verb == "bake" and not request.check)
         if is_written:
@@ -122,6 +124,10 @@ def _run(
                 return verbs.check(request.scene, loaded, request.output, settings, allowed, console)
             elif settings is not None:
                 _bake(request, settings, form, loaded, *of_all)
+            elif request.verb == "flip":
+                from .flip_verb import flip
+
+                flip(request.scene, loaded, request.output, *of_all)
             elif request.verb == "restore":
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
             elif form is not None:

@@ -21,7 +21,7 @@ from ..files.cornell import build_cornell_box
 from ..files.files import empty_scene, open_scene
 from ..files.output import OutputFolder
 from ..files.ownership import CORNELL_BOX, owner_of
-from ..files.saved_files import save_restored
+from ..files.saved_files import save_scene
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_record
 from ..jobs.finish import WRITING_STAGES
 from ..jobs.inspection import ERROR, inspect
@@ -214,7 +214,7 @@ def restore(
             last_bake.forget(each)
             kept_bakes.drop(each)
         make_folder_of(output)
-        save_restored(output)
+        save_scene(output)
         lines = [f"{count} object{'' if count == 1 else 's'} restored, written to {output}"]
         console.lines([*lines, *(f"warning: {warning.message}" for warning in restored.warnings)])
 

@@ -1,4 +1,4 @@
-"""The .blend files that the command line writes: the baked scene, and the restored one."""
+"""The .blend files that the command line writes: the baked scene, and a scene changed otherwise."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def save_copy(output: OutputFolder) -> None:
         raise BakeError(f"cannot write '{place}': {error.strerror}") from error
 
 
-def save_restored(path: Path) -> None:
+def save_scene(path: Path) -> None:
     """Save the open file as a compressed copy that replaces `path` once it is whole.
 
     Raises BakeError if it cannot be written.

@@ -27,6 +27,7 @@ from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
 from ..apply.apply import check_targets
+from ..apply.face_flips import found_faces
 from ..apply.rebake import Originals
 from ..apply.scopes import files_shown_by, shared_warnings
 from ..apply.shown_bake import shown_bake
@@ -35,6 +36,7 @@ from ..images.images import possible_names
 from ..relight import lightmap_versions
 from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
+from ..session.turned_faces import TurnedFaces
 from .finish import BakeJob, Copies, Scope, applying, finish
 from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
@@ -142,6 +144,20 @@ def prepare_bake(
     plan = planned.plan
     refuse_bake(plan.bake_scene, plan.settings, keep=planned.keeping is not None)
     return planned
+
+
+def find_turned_faces(
+    context: bpy.types.Context, settings: BakeSettings
+) -> Generator[Status, None, tuple[TurnedFaces, ...]]:
+    """Bake the context's scene, neither showing nor writing the result; return faces that show their backs.
+
+    Raises RadiosityError: Whatever cannot be baked.
+    """
+    _begin(settings)
+    yield Status("export", 0.0)
+    planned = yield from _planned(context, settings, None)
+    result, _ = yield from _solve(partial(run_pipeline, planned.plan, None, None), planned.seen, False, 1.0)
+    return found_faces(result.warnings, planned.export.bake_scene.objects, planned.export.sources)
 
 
 @dataclass(frozen=True, eq=False)
