@@ -47,16 +47,16 @@ def small_objects(
         # A column of a hundred faces has enough texels, and no more than one across each side.
         thin = float(areas[item.rows] @ (item.lit & is_collapsed(geometry.uv[item.rows])))
         if area > 0 and own < MIN_SIDE**2:
-            few = f"{own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}"
+            few = f"gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}"
             found.append((area, _few_texels(item.name, few, advice)))
         elif thin > 0 and (thin >= THIN_SHARE * area or thin >= THIN_SHARE_OF_ALL * sum(surface)):
-            few = f"one texel across {thin / area:.0%} of its surface, {own} texels in all"
+            few = f"is only one texel wide on {thin / area:.0%} of its surface ({own:,} texels in all)"
             found.append((thin, _few_texels(item.name, few, advice)))
     yield from (warning for _, warning in sorted(found, key=lambda each: -each[0]))
 
 
 def _few_texels(name: str, few: str, advice: str) -> BakeWarning:
-    return BakeWarning(name, f"object '{name}' gets only {few}: {advice}")
+    return BakeWarning(name, f"object '{name}' {few}: {advice}")
 
 
 def coincident_counts(objects: Sequence[BakeObject], scene: Scene) -> dict[str, int]:

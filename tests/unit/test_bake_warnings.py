@@ -68,7 +68,7 @@ def test_an_object_that_is_a_texel_wide_is_named_though_it_has_many() -> None:
     assert [name for name, _ in thin((*range(5), *range(10, 16)))] == ["House", "Table"]
     ((_, message),) = thin((0, 1, 2, 3, 4))
     assert message == (
-        "object 'Table' gets only one texel across 50% of its surface, 1000 texels in all: "
+        "object 'Table' is only one texel wide on 50% of its surface (1,000 texels in all): "
         "raise the resolution or its texel scale"
     )
     assert thin((0, 1, 2, 3, 4), glass=True) == []
