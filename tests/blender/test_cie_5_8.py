@@ -13,7 +13,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
-pytestmark = pytest.mark.usefixtures("registered")
+pytestmark = [pytest.mark.usefixtures("registered"), pytest.mark.one_blender]
 
 INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
 """(Φ / S) ρ / (1 − ρ) as the CIE prints it, by the reflectance of all walls."""

@@ -23,6 +23,8 @@ from radiosity_addon.options import BakeSettings
 from tests.moments import until
 from tests.processes import ROOT
 
+pytestmark = pytest.mark.one_blender
+
 WORKER = """
 import json, os, sys
 from pathlib import Path

@@ -17,6 +17,8 @@ from radiosity_addon.blender.session import last_bake
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
+pytestmark = pytest.mark.one_blender
+
 
 @pytest.mark.parametrize(
     ("name", "expected"),

@@ -263,6 +263,7 @@ def test_a_failure_while_relighting_leaves_the_version(room: Path, monkeypatch: 
     assert seen() == before
 
 
+@pytest.mark.one_blender
 def test_our_share_of_an_undo_step_is_small(room: Path) -> None:
     """Comparing takes far less than 100 ms, whatever the size of pages; a window does no more at once."""
     bake(resolution=512)

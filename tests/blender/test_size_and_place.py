@@ -13,6 +13,8 @@ from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.golden.rows.geometry import lit, moved
 
+pytestmark = pytest.mark.one_blender
+
 SETTINGS = BakeSettings(resolution=48, quality="draft", keep_uvs=True)
 
 
