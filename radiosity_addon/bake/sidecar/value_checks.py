@@ -45,8 +45,8 @@ def integers(value: Any, shape: Sequence[int], low: int, high: int) -> None:
 def numbers(value: Any, shape: Sequence[int], low: float, high: float = LARGE) -> None:
     """Refuse what are not finite numbers of a shape within [low, high]."""
     array_of(value, "f", shape)
-    # NaN fails both.
-    if value.size and not (low <= value.min() and value.max() <= high):
+    # NaN fails both. In a narrower type, the bounds would overflow.
+    if value.size and not (low <= float(value.min()) and float(value.max()) <= high):
         raise ValueError("a value out of range")
 
 

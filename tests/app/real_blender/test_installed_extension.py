@@ -31,7 +31,8 @@ def test_blender_validates_every_zip(blender, zips, platform) -> None:
 def test_registering_is_quick_and_imports_nothing_heavy(installed: Installed) -> None:
     answer = installed.answer("registration_cost.py")
     assert answer["enabled"] == [True, True]
-    assert min(answer["seconds"]) < 0.05
+    # About 0.05 s on the machines of 2026: Python takes a fifth of it to compile a module of 2,000 lines.
+    assert min(answer["seconds"]) < 6.0 * min(answer["compiling"])
     assert not {"embreex", "xatlas", "numerics", "solver", "bake", "lightmap"} & set(answer["modules"])
     assert all(path.startswith(installed.blender.inside(installed.resources)) for path in answer["wheels"])
 
