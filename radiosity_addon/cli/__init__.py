@@ -12,6 +12,7 @@ from .interrupts import Interrupts
 from .parser import (
     bake_output,
     build_parser,
+    check_blend,
     check_keeping,
     check_plot,
     check_scene,
@@ -32,6 +33,7 @@ __all__ = [
     "TemporaryFolder",
     "bake_output",
     "build_parser",
+    "check_blend",
     "check_folder",
     "check_keeping",
     "check_plot",

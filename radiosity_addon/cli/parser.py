@@ -114,6 +114,12 @@ def check_plot(plot: Path | None) -> None:
         raise UsageError(f"--plot {plot}: the plot is an SVG picture; choose a name that ends in .svg")
 
 
+def check_blend(output: Path) -> None:
+    """Refuse to write a scene into a file of another kind, such as the lightmap that it reads."""
+    if output.suffix.lower() != ".blend":
+        raise UsageError(f"--output {output}: a .blend is written; choose a name that ends in .blend")
+
+
 class _Parser(argparse.ArgumentParser):
     """An ArgumentParser whose errors are ours: one line, no exit."""
 

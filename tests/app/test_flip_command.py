@@ -85,3 +85,13 @@ def test_no_file_is_replaced_and_the_scene_never(run: Run, turned: Path, tmp_pat
     assert {**digest(turned.parent), **digest(tmp_path / "scenes")} == before
     assert run("flip", "--output", tmp_path / "a.blend").code == 2
     assert not (tmp_path / "a.blend").exists()
+
+
+def test_without_light_it_says_so(run: Run, tmp_path: Path) -> None:
+    add_quad("Floor", ((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)))
+    scene = save(tmp_path / "dark.blend")
+    out = tmp_path / "out.blend"
+    done = run("flip", scene, "--output", out)
+    assert (done.code, done.err) == (0, "")
+    assert f"no faces that show their backs were found; {out} is the scene as it was\n" in done.out
+    assert "warning: scene 'Scene' has no light at all" in done.out

@@ -266,17 +266,23 @@ def test_a_copy_of_the_report_never_replaces_what_is_not_one(run: Run, small: Pa
 @posix
 def test_links_devices_and_folders_are_no_places(run: Run, small: Path, tmp_path: Path) -> None:
     (tmp_path / "victim").write_text("years of work")
-    link, pipe, folder = tmp_path / "link.svg", tmp_path / "pipe.svg", tmp_path / "folder.svg"
-    link.symlink_to(tmp_path / "victim")
-    os.mkfifo(pipe)
-    folder.mkdir()
-    for place in (link, pipe, folder, Path("/dev/null")):
+
+    def odd_places(ending: str) -> tuple[Path, Path, Path]:
+        link, pipe, folder = (tmp_path / f"{name}{ending}" for name in ("link", "pipe", "folder"))
+        link.symlink_to(tmp_path / "victim")
+        os.mkfifo(pipe)
+        folder.mkdir()
+        return link, pipe, folder
+
+    for place in (*odd_places(".svg"), Path("/dev/null")):
         for option in ("--report", "--plot"):
             if option == "--plot" and place.suffix != ".svg":
                 continue
             done = run("bake", small, "--output", tmp_path / "out", *TINY, option, place, "--overwrite")
             refused(done, place)
-        refused(run("restore", small, "--output", place, "--overwrite"), place)
+    for place in odd_places(".blend"):
+        for verb in ("restore", "flip"):
+            refused(run(verb, small, "--output", place, "--overwrite"), place)
     assert (tmp_path / "victim").read_text() == "years of work"
     assert not (tmp_path / "out").exists()
     assert Path("/dev/null").is_char_device()
@@ -307,6 +313,9 @@ def test_restore_writes_no_file_that_is_there(run: Run, small: Path, tmp_path: P
     with nothing_changed(tmp_path):
         refused(run("restore", baked, "--output", baked, "--overwrite"), "baked.blend", code=2)
         refused(run("restore", baked, "--output", tmp_path / "mine.blend"), "mine.blend", "--overwrite")
+        for verb in ("restore", "flip"):
+            lightmap = run(verb, baked, "--output", out / "lightmap.exr", "--overwrite")
+            refused(lightmap, "lightmap.exr", "ends in .blend", code=2)
     assert run("restore", baked, "--output", tmp_path / "mine.blend", "--overwrite").code == 0
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "mine.blend"))
     assert "Floor" in bpy.data.objects

@@ -22,6 +22,7 @@ from ...cli import (
     Permissions,
     bake_output,
     build_parser,
+    check_blend,
     check_keeping,
     check_plot,
     check_scene,
@@ -71,6 +72,8 @@ def main(
         if is_written:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
+        if request.verb in ("flip", "restore"):
+            check_blend(request.output)
         if settings is not None and not request.check:
             check_keeping(request, settings)
         wanted = request.forms if request.verb == "export" else getattr(request, "export", None)

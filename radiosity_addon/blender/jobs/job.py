@@ -148,16 +148,18 @@ def prepare_bake(
 
 def find_turned_faces(
     context: bpy.types.Context, settings: BakeSettings
-) -> Generator[Status, None, tuple[TurnedFaces, ...]]:
-    """Bake the context's scene, neither showing nor writing the result; return faces that show their backs.
+) -> Generator[Status, None, tuple[tuple[TurnedFaces, ...], tuple[BakeWarning, ...]]]:
+    """Bake the context's scene, neither showing nor writing the result.
 
+    Returns faces that show their backs, and what the bake warns of.
     Raises RadiosityError: Whatever cannot be baked.
     """
     _begin(settings)
     yield Status("export", 0.0)
     planned = yield from _planned(context, settings, None)
     result, _ = yield from _solve(partial(run_pipeline, planned.plan, None, None), planned.seen, False, 1.0)
-    return found_faces(result.warnings, planned.export.bake_scene.objects, planned.export.sources)
+    warnings = (*planned.warnings, *result.warnings)
+    return found_faces(warnings, planned.export.bake_scene.objects, planned.export.sources), warnings
 
 
 @dataclass(frozen=True, eq=False)
