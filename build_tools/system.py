@@ -58,17 +58,12 @@ def find_python(version: tuple[int, int]) -> str:
 
 
 def newest_python(versions: Iterable[tuple[int, int]]) -> tuple[int, int]:
-    """Return the newest of these versions that is here.
-
-    Raises BuildError if none of them is.
-    """
-    newest_first = sorted(versions, reverse=True)
-    for version in newest_first[:-1]:
+    """Return the newest of these versions that is here and makes environments; else the running one."""
+    for version in sorted(versions, reverse=True):
         with suppress(BuildError):
-            find_python(version)
-            return version
-    find_python(newest_first[-1])
-    return newest_first[-1]
+            if _makes_environments(find_python(version)):
+                return version
+    return sys.version_info[:2]
 
 
 def version_of(python: str) -> tuple[int, int] | None:

@@ -24,6 +24,7 @@ from .farm_spec import read_farm_spec
 from .path_checks import checked_folder, checked_name, checked_path
 
 SCENE_SUFFIXES = (".blend", ".glb", ".gltf", ".obj")
+"""How names of scenes end that can be opened."""
 
 BUNDLED_OUTPUT = Path("out/cornell")
 """Where the bundled scene goes when no --output is given."""

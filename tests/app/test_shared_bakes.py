@@ -68,7 +68,7 @@ def baked_bytes(scene: BakeScene, spool: Path | None = None) -> str:
     return hashlib.sha1(b"".join(page.pixels.tobytes() for page in result.pages)).hexdigest()
 
 
-# Where there is glass, all kernels run that do in the other room.
+# The room without glass repeats the checks of the one with it.
 @pytest.fixture(scope="module", params=["glass", pytest.param("room", marks=pytest.mark.full)])
 def name(request: pytest.FixtureRequest) -> str:
     return request.param
