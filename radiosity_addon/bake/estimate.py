@@ -36,19 +36,22 @@ MOST_GAPS = 0.12
 what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
 utilization and texels per meter are right within 10 % there."""
 
-RAYS_A_TEXEL, RAYS_AT_EDGES = 25.0, 5200.0
-"""Rays for each texel at medium quality: of charts of n texels the first and the second / √n. What stands
-close together has small charts, and texels next to others are divided."""
+RAYS_IN_CHARTS = {"sketch": 20.0, "draft": 30.0, "medium": 90.0, "high": 380.0}
+"""Rays for each texel of a large chart, …"""
+
+RAYS_AT_EDGES = 5200.0
+"""… and this / √n more in charts of n texels, at medium quality: texels next to others are divided."""
 
 MOST_AT_EDGES = 700.0
 """All texels are next to others where charts are small; more rays than these none of them takes."""
 
-RAYS = {"sketch": 0.48, "draft": 0.67, "medium": 1.0, "high": 1.65}
-"""Times as much work: finer points share what is done once."""
+WORK = {"sketch": 0.42, "draft": 0.65, "medium": 1.0, "high": 1.65}
+"""Times as much work at edges and for sources: finer points share what is done once."""
 
 SECONDS_A_RAY, SECONDS_A_SOURCE = 0.25e-6, 18e-6
-"""On two cores: of a ray, with all that is done with what it meets; of a texel for each lamp, bright patch
-of the sky and emissive object. Fitted to the Cornell box, an office, homes, a classroom and a staircase."""
+"""Of a ray, with all that is done with what it meets; of a texel at medium quality for each lamp, patch of
+the sky and emissive object: on two cores that take 13.4 s for 256 samples of Cycles in the Cornell box of
+bench. Fitted to that box, an office, homes, a classroom and a staircase."""
 
 MOST_SOURCES = 64
 """More are grouped."""
@@ -68,12 +71,9 @@ ENCODE_SECONDS, REPORT_SECONDS = 1.5e-6, 6e-6
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-KEPT_RAYS = {"sketch": 0.5, "draft": 0.7, "medium": 1.0, "high": 1.6}
-"""Times as many rays of which is kept what they met, …"""
-
-BYTES_A_RAY, BYTES_AT_EDGES, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 7.5, 20.0, 380.0, 40.0, 30e6
-"""… memory of texels, which is in files beyond the memory limit: what a ray met is kept while light is swept,
-more of it in small charts, as with rays; where texels lie, and their light; the pages."""
+BYTES_A_RAY, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 8.5, 380.0, 40.0, 30e6
+"""Memory of texels, which is in files beyond the memory limit: what a ray met is kept while light is swept;
+where texels lie, and their light; the pages."""
 
 UNSURE = 0.8
 """Pages that follow from a density are refused before they are laid out if so much of their width would."""
@@ -173,10 +173,11 @@ def estimate_bake(
     pages, texels = _pages(objects, settings)
     total = sum(texels)
     crowded = math.sqrt(sum(item.charts for item in objects) / max(total, 1.0))
-    rays = total * (RAYS_A_TEXEL + min(RAYS_AT_EDGES * crowded, MOST_AT_EDGES))
+    at_edges = WORK[settings.quality] * min(RAYS_AT_EDGES * crowded, MOST_AT_EDGES)
+    rays = total * (RAYS_IN_CHARTS[settings.quality] + at_edges)
     of_texels = (
         BYTES_AT_LEAST
-        + (BYTES_A_RAY + BYTES_AT_EDGES * crowded) * KEPT_RAYS[settings.quality] * rays
+        + BYTES_A_RAY * rays
         + BYTES_A_TEXEL * total
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
@@ -229,14 +230,14 @@ def estimate_of(bake_scene: BakeScene, settings: BakeSettings) -> Estimate:
 def _stages(
     triangles: int, kept: int, texels: float, rays: float, sources: int, settings: BakeSettings
 ) -> StageSeconds:
-    """Return how long stages take. `kept` of the triangles keep their layout; `rays` are those of medium."""
-    lighting = SECONDS_A_RAY * rays + SECONDS_A_SOURCE * texels * min(sources, MOST_SOURCES)
+    """Return how long stages take. `kept` of the triangles keep their layout."""
+    of_sources = WORK[settings.quality] * SECONDS_A_SOURCE * texels * min(sources, MOST_SOURCES)
     parallel = (CORES / thread_count(settings.threads)) ** 0.6
     return StageSeconds(
         unwrap=UNWRAP_SECONDS * (triangles - kept) + KEPT_SECONDS * kept,
         rasterize=FIND_SECONDS * (triangles - kept) + FIND_KEPT_SECONDS * kept + FIND_TEXEL_SECONDS * texels,
         solve=parallel * SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45,
-        light=parallel * RAYS[settings.quality] * lighting,
+        light=parallel * (SECONDS_A_RAY * rays + of_sources),
         encode=ENCODE_SECONDS * texels + REPORT_SECONDS * (triangles - kept),
     )
 

@@ -7,12 +7,13 @@ into the gap.
 
 Closed objects that are inside out are found by their shape alone, also before a bake. For all others it takes
 light. The solver's elements are too coarse for this: inside a thin shell they get a tenth of the light around
-it. So fronts are judged by their texels, and backs by rays.
+it. So fronts are judged by their texels, and backs by rays. A rail along a wall may get light on many of its
+fronts, in the gap behind it; what the scene's cameras see only from behind is turned all the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ..base import BakeWarning
 from ..lightmap.texels import TexelGeometry
 from ..lightmap.transport import TexelLight
 from ..numerics import Array, Stream, cosine_hemisphere, stratified_square, tiles, to_world
-from ..rays import NO_HIT, Hits
+from ..rays import NO_HIT, Hits, free_segment
 from ..scene import BakeObject, BakeScene, Scene, inside_out, places, wound_parts
 from ..solver import Solution
 from ..solver.gather import Footprints, LocalPass
@@ -41,6 +42,9 @@ and closed ones, which are dark inside, never are."""
 
 PROBED, PROBES = 64, 16
 """So many dark triangles of an object are looked at from behind, by so many rays each."""
+
+VIEWED = 0.1
+"""Cameras see a part only from behind if fronts are at most this part of what they see of it."""
 
 OPEN = 0.5
 """A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
@@ -75,7 +79,7 @@ def of_turned_faces(
     if light is not None:
         front = front_irradiance(baked, geometry, light, front)
     front = front + bake_scene.scene.emission.max(axis=1)
-    probe = BackProbe(bake_scene.scene, solution.local_pass)
+    probe = BackProbe(bake_scene.scene, solution.local_pass, bake_scene.cameras)
     back = solution.back_irradiance.max(axis=1)
     named = {warning.name for warning in turned}
     for warning in turned_away(baked, bake_scene.scene, front, back, probe):
@@ -100,10 +104,14 @@ def of_inside_out(bake_scene: BakeScene) -> list[BakeWarning]:
 
 
 class BackProbe:
-    """Decides by rays whether light reaches triangles from behind."""
+    """Decides by rays whether light reaches triangles from behind, and which of their sides are seen.
 
-    def __init__(self, scene: Scene, local: LocalPass) -> None:
+    cameras (n, 3): Where the scene is seen from.
+    """
+
+    def __init__(self, scene: Scene, local: LocalPass, cameras: Sequence[Sequence[float]] = ()) -> None:
         self._scene, self._local = scene, local
+        self._cameras = np.array(cameras, dtype=np.float64).reshape(-1, 3)
 
     def all_lit(self, rows: Array, least: float) -> Array:
         """Return what `lit` does, for any number of triangles."""
@@ -126,6 +134,18 @@ class BackProbe:
             near = hits.distance.reshape(-1, PROBES) < reach[chunk, None]
             found[chunk] = near.mean(axis=1) >= HIDDEN
         return found
+
+    def viewed(self, rows: Array) -> tuple[Array, Array]:
+        """Return how many cameras see the middles of triangles from the front and from behind, (n,) each."""
+        points, normals = self._scene.triangles[rows].mean(axis=1), self._scene.face_normals[rows]
+        counts = np.zeros((2, len(rows)))
+        for camera in self._cameras:
+            offset = camera - points
+            side = np.sign((offset * normals).sum(axis=1, keepdims=True))
+            starts = points + 2.0 * self._local.caster.surface_offset * side * normals
+            is_free = free_segment(self._local.caster, starts, np.broadcast_to(camera, points.shape))
+            counts += is_free * np.array([side[:, 0] > 0, side[:, 0] < 0])
+        return counts[0], counts[1]
 
     def _seen(self, rows: Array, side: float) -> tuple[Array, Array, Hits]:
         """Return the middles of triangles, normals on a side, both (n, 3), and what rays from there hit."""
@@ -160,9 +180,11 @@ def turned_away(
             continue
         suspects = item.first + np.flatnonzero(dark[item.rows])
         part = wound_parts(places(scene.triangles[item.rows]))
+        behind = np.bincount(part, area * (back - front)[item.rows]) > 0
+        behind &= only_seen_from_behind(probe, item, part, area)
         others = np.flatnonzero((dim & ~dark)[item.rows])
         reach = WITHIN * np.sqrt(np.bincount(part, area)[part[others]])
-        hidden = item.first + others[probe.hidden(item.first + others, reach)]
+        hidden = item.first + others[behind[part[others]] | probe.hidden(item.first + others, reach)]
         suspects = np.sort(np.append(suspects, hidden))
         share = float(areas[suspects].sum() / area.sum())
         if share <= MAX_TURNED_SHARE:
@@ -179,6 +201,7 @@ def turned_away(
             fine = np.flatnonzero(right)
             reach = WITHIN * np.sqrt(np.bincount(part, area)[part[fine]])
             right[fine] = ~probe.hidden(item.first + fine, reach)
+            unlit, right = unlit | behind[part], right & ~behind[part]
             polygons = turned_polygons(item, part, area, turned, unlit, right)
             ways = f"{FLIPS} or Mesh → Normals → Flip" if polygons else "Mesh → Normals → Flip"
             message = (
@@ -189,6 +212,16 @@ def turned_away(
             found.append((share * float(area.sum()), BakeWarning(item.name, message, turned=polygons)))
     for _, warning in sorted(found, key=lambda each: -each[0]):
         yield warning
+
+
+def only_seen_from_behind(probe: BackProbe, item: BakeObject, part: Array, areas: Array) -> Array:
+    """Return (parts,) whether cameras see a part of an object, but hardly any of its fronts.
+
+    part (count,) int, areas (count,) [m²]: Of the object's triangles.
+    """
+    rows = np.arange(item.first, item.first + item.count)
+    fronts, backs = (np.bincount(part, areas * seen) for seen in probe.viewed(rows))
+    return (backs > 0) & (fronts <= VIEWED * (fronts + backs))
 
 
 def turned_polygons(

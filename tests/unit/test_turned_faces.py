@@ -33,6 +33,9 @@ class AlwaysLit(BackProbe):
     def hidden(self, rows: np.ndarray, reach: np.ndarray) -> np.ndarray:
         return np.zeros(len(rows), dtype=bool) & (reach > 0.0)
 
+    def viewed(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(rows)), np.zeros(len(rows))
+
 
 def told(scene: BakeScene, **settings: int) -> list[str]:
     result = run(scene, **settings)
@@ -134,7 +137,7 @@ def test_a_frame_that_faces_the_wall_it_hangs_on_is_warned_of(is_turned: bool) -
     assert told(found, resolution=256) == (["Frame"] if is_turned else [])
 
 
-def test_a_partition_that_faces_the_darker_room_is_not_warned_of() -> None:
+def partition_that_faces_the_darker_room() -> BakeScene:
     """Its back gets several times as much light, but its front is seen, and lit."""
     walls, _ = box_room((3, 4, 2.5), 4)
     partition = rectangle((0, 2, 0), (2, 0, 0), (0, 0, 2.5), 2)
@@ -146,7 +149,26 @@ def test_a_partition_that_faces_the_darker_room_is_not_warned_of() -> None:
     front = float(solved.triangle_irradiance[own].mean())
     assert 0.05 * float(solved.back_irradiance[own].mean()) < front
     assert front < 0.5 * float(solved.back_irradiance[own].mean())
-    assert told(bake_scene(scene, ("Room", len(walls)), ("Partition", len(partition)))) == []
+    return bake_scene(scene, ("Room", len(walls)), ("Partition", len(partition)))
+
+
+@pytest.mark.parametrize(
+    ("cameras", "named"),
+    [
+        ((), []),
+        (((1, 1, 1),), []),
+        (((1, 3, 1),), ["Partition"]),
+        (((1, 3, 1), (1, 1, 1)), []),
+        # Beyond the room's wall, which hides the partition.
+        (((1, 9, 1),), []),
+    ],
+)
+def test_what_cameras_see_only_from_behind_is_turned(
+    cameras: tuple[tuple[float, float, float], ...], named: list[str]
+) -> None:
+    result = run(replace(partition_that_faces_the_darker_room(), cameras=cameras))
+    found = [(warning.name, warning.turned) for warning in result.warnings if "behind" in warning.message]
+    assert found == [(name, (0, 1, 2, 3)) for name in named]
 
 
 @pytest.mark.parametrize("shines", [False, True])
