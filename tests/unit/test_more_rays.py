@@ -16,6 +16,7 @@ from radiosity_addon.lightmap.lighting import reconstruction
 from radiosity_addon.lightmap.lighting.reconstruction import light_texels
 from radiosity_addon.lightmap.transport import GatherSettings, HitTable, TexelTransport, more_rays
 from radiosity_addon.lightmap.transport.gather_points import STARTS, gather_at
+from radiosity_addon.lightmap.transport.ray_runs import RUNS
 from radiosity_addon.numerics import Scratch
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import SolverSettings, solve
@@ -52,6 +53,11 @@ def test_what_was_traced_stays_and_sequences_go_on(monkeypatch: pytest.MonkeyPat
     gather = GatherSettings(strides=(2, 1), rays=32)
     light = light_texels(scene, local, geometry, gather, more_rays=lambda _: next(factors))
     ((table, old, before),), ((new, after, _),) = watched.before, watched.after
+    # On the lattice of every second texel all points take twice as many runs as the others do in the mean.
+    assert (np.bincount(before.texel[before.level == 0])[before.texel[before.level == 0]] == 2 * RUNS).all()
+    finer = before.level == 1
+    assert finer.sum() == pytest.approx(RUNS * (finer & (before.run == 0)).sum(), rel=0.1)
+    assert before.runs(gather.strides) == pytest.approx(RUNS, rel=0.1)
     # As many times more rays, whole runs of each point one after the other.
     assert len(after.run) == pytest.approx(FACTOR * len(before.run), rel=0.01)
     first = np.flatnonzero(after.run == 0)

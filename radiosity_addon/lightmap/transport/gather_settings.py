@@ -12,7 +12,7 @@ class GatherSettings:
     strides: Lattices of gather points, coarse to fine, in texels; finer ones are used only where coarser
         points do not reach. The last is 1, so that every texel is reached.
     support: A texel whose coarser points weigh less than this together becomes a point itself.
-    rays: A gather point.
+    rays: A gather point where every texel is one; on coarser lattices times their stride.
     cell_rays: Most rays of a cell that gather rays met where no texel answers.
     sweeps: Jacobi sweeps over the texels, at most, …
     tolerance: … or until no texel changes by more than this part of the mean.

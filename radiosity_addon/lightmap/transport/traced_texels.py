@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from ...numerics import Array
 from .gather_settings import GatherSettings
@@ -30,10 +33,13 @@ class GatherPointLayout:
     closeness: Array
     farthest: Array
 
-    @property
-    def runs(self) -> float:
-        """How many runs a point takes in the mean."""
-        return len(self.run) / max(int((self.run == 0).sum()), 1)
+    def runs(self, strides: Sequence[int]) -> float:
+        """Return how many runs a point takes in the mean, for each texel that its level's lattice steps over.
+
+        strides: Of the levels.
+        """
+        relative = np.bincount(self.level, minlength=len(strides)) / np.array(strides)
+        return float(relative.sum()) / max(int((self.run == 0).sum()), 1)
 
 
 @dataclass(frozen=True, eq=False)
