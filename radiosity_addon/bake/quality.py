@@ -58,7 +58,7 @@ QUALITY_SETTINGS = {
             patches=200,
             contrast=0.1,
         ),
-        GatherSettings(strides=(4, 2, 1), support=1.5, rays=144, tolerance=4e-4),
+        GatherSettings(strides=(4, 2, 1), support=1.5, rays=160, tolerance=4e-4),
     ),
     "high": Quality(
         SolverSettings(
@@ -70,7 +70,7 @@ QUALITY_SETTINGS = {
             patches=400,
             contrast=0.05,
         ),
-        GatherSettings(strides=(4, 2, 1), support=6.0, rays=256, sweeps=128, tolerance=2e-4),
+        GatherSettings(strides=(4, 2, 1), support=6.0, rays=384, sweeps=128, tolerance=2e-4),
     ),
 }
 

@@ -99,8 +99,8 @@ def test_a_bake_to_an_error_follows_a_move() -> None:
     settings = replace(SETTINGS, quality="medium", relative_error=0.015)
     result, before = bake_and_keep(room(), settings)
     found, after = bake_moved(before, room(ELSEWHERE, 30.0))
-    strides = before.moves.traced.settings.strides
-    runs = [kept.moves.traced.points.runs(strides) for kept in (before, after)]
+    times = before.moves.traced.settings.times_rays
+    runs = [kept.moves.traced.points.runs(times) for kept in (before, after)]
     assert runs[0] > 2.5
     assert runs[1] == pytest.approx(runs[0], rel=0.05)
     expected = pixels(bake(laid_out_as(room(ELSEWHERE, 30.0), before.geometry.uv), settings))

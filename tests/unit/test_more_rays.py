@@ -57,7 +57,7 @@ def test_what_was_traced_stays_and_sequences_go_on(monkeypatch: pytest.MonkeyPat
     assert (np.bincount(before.texel[before.level == 0])[before.texel[before.level == 0]] == 2 * RUNS).all()
     finer = before.level == 1
     assert finer.sum() == pytest.approx(RUNS * (finer & (before.run == 0)).sum(), rel=0.1)
-    assert before.runs(gather.strides) == pytest.approx(RUNS, rel=0.1)
+    assert before.runs(gather.times_rays) == pytest.approx(RUNS, rel=0.1)
     # As many times more rays, whole runs of each point one after the other.
     assert len(after.run) == pytest.approx(FACTOR * len(before.run), rel=0.01)
     first = np.flatnonzero(after.run == 0)

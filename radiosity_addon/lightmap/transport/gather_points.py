@@ -173,7 +173,7 @@ def gather_texels(
     mean = float(RUNS)
     if kept is not None:
         points.farthest = np.where(kept.unsure, np.inf, kept.before.farthest)
-        mean = kept.before.runs(settings.strides)
+        mean = kept.before.runs(settings.times_rays)
     runs = _Runs(local, geometry, max(settings.rays // RUNS, 1))
     variance = np.zeros(0)
     for level, (stride, of_level) in enumerate(progress.part(0.0, 1.0 - FIT).each(settings.strides)):
@@ -187,7 +187,7 @@ def gather_texels(
             runs.add(texel, run, stays)
             found.append((run, stays.sources, stays.tints))
         chosen = _choose(points, crossings, kept, stride, settings.support, of_level.part(0.0, 0.15))
-        many = runs_of(points, variance, chosen, mean * stride, of_level.part(0.15, 0.2))
+        many = runs_of(points, variance, chosen, mean * settings.times_rays[level], of_level.part(0.15, 0.2))
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
         done = 0.2

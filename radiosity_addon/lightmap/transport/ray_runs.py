@@ -1,7 +1,8 @@
 """How many rays gather points take: more where coarser points around them see light that varies more.
 
-A point of a lattice of every fourth texel speaks for sixteen of them. The noise of all texels together is
-least if the rays of a point are in proportion to the square root of that, which is the lattice's stride.
+A point of a lattice of every fourth texel speaks for sixteen of them, or for fewer if more points have to
+speak for each texel. The noise of all texels together is least if the rays of a point are in proportion to
+the square root of that (`GatherSettings.times_rays`).
 
 Rays come in runs of the same length; a point takes one or several, which go on in one sequence. Each run has
 a row of its own among the stored hits, and a point stands for the mean of its rows. The number of runs
@@ -22,7 +23,7 @@ from ..points import GatherPoints, Interpolation
 from .traced_texels import GatherPointLayout
 
 RUNS = 2
-"""Runs of rays of a point where every texel is one, in the mean; on coarser lattices stride times as many."""
+"""Runs of rays of a point where every texel is one, in the mean; on coarser lattices `times_rays` as many."""
 
 MOST_RUNS = 16
 """No point takes more, where the mean is `RUNS`."""

@@ -33,12 +33,9 @@ class GatherPointLayout:
     closeness: Array
     farthest: Array
 
-    def runs(self, strides: Sequence[int]) -> float:
-        """Return how many runs a point takes in the mean, for each texel that its level's lattice steps over.
-
-        strides: Of the levels.
-        """
-        relative = np.bincount(self.level, minlength=len(strides)) / np.array(strides)
+    def runs(self, times_rays: Sequence[float]) -> float:
+        """Return how many runs a point takes in the mean, where levels take `times_rays` as many."""
+        relative = np.bincount(self.level, minlength=len(times_rays)) / np.array(times_rays)
         return float(relative.sum()) / max(int((self.run == 0).sum()), 1)
 
 
