@@ -36,7 +36,7 @@ MOST_GAPS = 0.12
 what charts fill of a page, to the classroom, the staircase, the office and the Cornell box at 512² and 1024²:
 utilization and texels per meter are right within 10 % there."""
 
-RAYS_IN_CHARTS = {"sketch": 28.0, "draft": 47.0, "medium": 120.0, "high": 350.0}
+RAYS_IN_CHARTS = {"sketch": 28.0, "draft": 47.0, "medium": 120.0, "high": 390.0}
 """Rays for each texel of a large chart, …"""
 
 RAYS_AT_EDGES = 5200.0
