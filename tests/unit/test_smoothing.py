@@ -99,6 +99,22 @@ def test_a_wall_between_texels_keeps_them_apart() -> None:
     np.testing.assert_allclose(smooth[left[:, 0]], 1.0, rtol=1e-6)
 
 
+def test_divided_texels_share_with_each_other_only() -> None:
+    geometry, caster = floor()
+    alone = np.asarray(geometry.column == 10)
+    smoothing = Smoothing(alike_neighbors(geometry, caster, alone), np.full(len(geometry), 16, dtype=np.uint8))
+    values = np.random.default_rng(4).random((len(geometry), 3)).astype(np.float32)
+    values[~alone] += 5.0
+    smooth = smoothing(geometry, values)
+    for kind in (alone, ~alone):
+        np.testing.assert_allclose(smooth[kind].sum(axis=0), values[kind].sum(axis=0), rtol=1e-5)
+        assert smooth[kind].std() < 0.6 * values[kind].std()
+    assert smooth[alone].max() < 1.0
+    # What lies on either side of them is apart.
+    left = np.asarray(geometry.column < 10)
+    np.testing.assert_allclose(smooth[left].sum(axis=0), values[left].sum(axis=0), rtol=1e-5)
+
+
 def test_threads_and_operators_are_the_same() -> None:
     geometry, caster = floor()
     alike = neighbors(geometry, caster)

@@ -163,20 +163,23 @@ def columns(parts: Sequence[Array], scratch: Scratch) -> Array:
 def alike_neighbors(geometry: TexelGeometry, caster: RayCaster, alone: Array, threads: int = 0) -> Array:
     """Return (n,) uint8: which neighbors on the page, bit by bit, continue a texel's surface and see it.
 
-    alone (n,): Texels that have none.
+    Texels that geometry divides or hoods, alone (n,), are neighbors of such texels only: along a wall's foot
+    they hold alike mixtures, which nothing in the open does. Likewise those that triangles share.
     """
     grid = _Grid(geometry, None, threads)
     found, mutual = (geometry.scratch.empty(len(geometry), np.uint8) for _ in range(2))
-    single = alone if geometry.shared is None else alone | (geometry.shared.number >= 0)
+    kind = alone.astype(np.uint8)
+    if geometry.shared is not None:
+        kind[geometry.shared.number >= 0] = 2
     width = np.sqrt(geometry.texel_area)
-    candidates = partial(_alike, geometry, caster, single, width, grid)
+    candidates = partial(_alike, geometry, caster, kind, width, grid)
     fill_chunks(candidates, found, len(geometry), CHUNK, threads)
     fill_chunks(partial(_mutual, grid, found), mutual, len(geometry), CHUNK, threads)
     return mutual
 
 
 def _alike(
-    geometry: TexelGeometry, caster: RayCaster, single: Array, width: Array, grid: _Grid, rows: slice
+    geometry: TexelGeometry, caster: RayCaster, kind: Array, width: Array, grid: _Grid, rows: slice
 ) -> Array:
     """Return (r,) uint8 the neighbors of a run of texels."""
     texel = np.arange(rows.start, rows.stop)
@@ -185,8 +188,7 @@ def _alike(
     lift = SIGHT_LIFT * caster.surface_offset
     for bit, step in enumerate(_STEPS):
         other = grid.neighbor(rows, step)
-        pair = np.flatnonzero((other >= 0) & ~single[rows])
-        pair = pair[~single[other[pair]]]
+        pair = np.flatnonzero((other >= 0) & (kind[rows] == kind[other]))
         far = other[pair]
         along = geometry.position[far] - position[pair]
         distance = np.linalg.norm(along, axis=1)
