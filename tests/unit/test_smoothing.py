@@ -102,7 +102,8 @@ def test_a_wall_between_texels_keeps_them_apart() -> None:
 def test_divided_texels_share_with_each_other_only() -> None:
     geometry, caster = floor()
     alone = np.asarray(geometry.column == 10)
-    smoothing = Smoothing(alike_neighbors(geometry, caster, alone), np.full(len(geometry), 16, dtype=np.uint8))
+    alike = alike_neighbors(geometry, caster, alone)
+    smoothing = Smoothing(alike, np.full(len(geometry), 16, dtype=np.uint8))
     values = np.random.default_rng(4).random((len(geometry), 3)).astype(np.float32)
     values[~alone] += 5.0
     smooth = smoothing(geometry, values)

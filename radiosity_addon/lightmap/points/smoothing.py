@@ -17,8 +17,8 @@ from functools import partial
 import numpy as np
 
 from ...numerics import Array, Scratch, fill_chunks, tiles
-from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
-from ..texels import NO_TEXEL, TexelGeometry
+from ...rays import SAGITTA, SIGHT_LIFT, RayCaster, free_segment
+from ..texels import CORNERS, NO_TEXEL, TexelGeometry
 
 PASSES = (1, 2, 4, 8, 16)
 """Steps that a texel may take, besides none."""
@@ -39,6 +39,9 @@ BAND = 1 << 20
 
 CHUNK = 1 << 15
 """Texels smoothed at once; bounds the temporaries to about 20 MB a thread."""
+
+_ALONE, _SHARED = 1, 2
+"""Kinds of texels, besides those in the open, 0: neighbors are of one kind."""
 
 _STEPS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
 """(8, 2): rows and columns from a texel to its neighbors."""
@@ -163,14 +166,15 @@ def columns(parts: Sequence[Array], scratch: Scratch) -> Array:
 def alike_neighbors(geometry: TexelGeometry, caster: RayCaster, alone: Array, threads: int = 0) -> Array:
     """Return (n,) uint8: which neighbors on the page, bit by bit, continue a texel's surface and see it.
 
-    Texels that geometry divides or hoods, alone (n,), are neighbors of such texels only: along a wall's foot
-    they hold alike mixtures, which nothing in the open does. Likewise those that triangles share.
+    Texels that geometry divides or hoods, alone (n,), are neighbors of such texels only, and if corner by
+    corner they see each other: along a wall's foot they hold alike mixtures, which nothing in the open does.
+    Those that triangles share are neighbors of each other only, too.
     """
     grid = _Grid(geometry, None, threads)
     found, mutual = (geometry.scratch.empty(len(geometry), np.uint8) for _ in range(2))
-    kind = alone.astype(np.uint8)
+    kind = np.uint8(_ALONE) * alone
     if geometry.shared is not None:
-        kind[geometry.shared.number >= 0] = 2
+        kind[geometry.shared.number >= 0] = _SHARED
     width = np.sqrt(geometry.texel_area)
     candidates = partial(_alike, geometry, caster, kind, width, grid)
     fill_chunks(candidates, found, len(geometry), CHUNK, threads)
@@ -203,8 +207,23 @@ def _alike(
         way = along[near] + rise * (geometry.normal[far] - normal[pair])
         length = np.linalg.norm(way, axis=1)
         free = caster.unoccluded(position[pair] + rise * normal[pair], way / length[:, None], length)
-        found[pair[free]] |= np.uint8(1 << bit)
+        pair, far = pair[free], far[free]
+        found[pair[_cut_alike(geometry, caster, kind, texel[pair], far)]] |= np.uint8(1 << bit)
     return found
+
+
+def _cut_alike(geometry: TexelGeometry, caster: RayCaster, kind: Array, one: Array, other: Array) -> Array:
+    """Return (p,) bool: texels see each other corner by corner, or nothing divides them."""
+    alike = np.ones(len(one), dtype=bool)
+    alone = np.flatnonzero(kind[one] == _ALONE)
+    begin, end = (
+        geometry.sample(texels, np.broadcast_to(CORNERS, (len(texels), 4, 2)))
+        + (SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[texels])[:, None]
+        for texels in (one[alone], other[alone])
+    )
+    free = free_segment(caster, begin.reshape(-1, 3), end.reshape(-1, 3))
+    alike[alone] = free.reshape(-1, 4).all(axis=1)
+    return alike
 
 
 class _Grid:

@@ -6,7 +6,7 @@ No light yet.
 from __future__ import annotations
 
 from .cells import TexelCells
-from .occlusion import Crossings, below_hood, find_crossings
+from .occlusion import CORNERS, Crossings, below_hood, find_crossings
 from .rasterization import FOOTPRINT, coverage_sum, rasterize
 from .shared_texels import is_collapsed, texel_areas
 from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
@@ -16,6 +16,7 @@ from .texel_geometry import NO_TEXEL, TexelGeometry
 from .uneven import uneven_texels
 
 __all__ = [
+    "CORNERS",
     "DIVIDED",
     "ENCLOSED",
     "FOOTPRINT",

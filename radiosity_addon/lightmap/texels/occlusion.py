@@ -35,7 +35,9 @@ HOOD = 0.25
 """What is nearer above a surface than this part of a texel's width hoods it. Light reaches about as far
 into a gap as the gap is high: into a high one it fades over texels, without a hood's sharp rim."""
 
-_CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
+"""Of a texel's unit square, in turn."""
+
 _EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 _DIAGONALS = np.array([[0, 2], [1, 3]])
 _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)], dtype=np.float32)
@@ -129,7 +131,7 @@ def _find(geometry: TexelGeometry, caster: RayCaster, tested: Array | None, part
     # All of the texel that is on its triangle: hits land all over it, though its light comes
     # from the middle.
     corners, ends = square.copy(), np.flatnonzero(~geometry.whole[rows])
-    spots = np.broadcast_to(_CORNERS, (len(ends), 4, 2))
+    spots = np.broadcast_to(CORNERS, (len(ends), 4, 2))
     corners[ends] = geometry.sample(rows[ends], spots, 1.0) + lift[ends]
     center = geometry.position[rows][:, None] + lift
     from_center = corners - center
