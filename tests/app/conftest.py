@@ -17,7 +17,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 ROOT = Path(__file__).resolve().parents[2]
-QUICK = ("--resolution", "32", "--quality", "draft", "--no-preview")
+QUICK = ("--resolution", "32", "--quality", "sketch", "--no-preview")
 """A small bake. Previews are rendered where a test looks at one."""
 
 

@@ -35,7 +35,9 @@ def made(tmp_path: Path) -> Iterator[ExportScene]:
     radiosity_addon.unregister()
 
 
-@pytest.mark.parametrize("channel", ["base", "emission", "alpha"])
+@pytest.mark.parametrize(
+    "channel", ["base", *(pytest.param(other, marks=pytest.mark.full) for other in ("emission", "alpha"))]
+)
 def test_joined_objects_are_evaluated_as_each_alone(made: ExportScene, channel: str) -> None:
     meshes = len(bpy.data.meshes)
     (alone,) = evaluate_channel(bpy.context, made, made.baked_copies, SIZES, channel)

@@ -33,7 +33,7 @@ Run = Callable[..., object]
 
 def test_the_bundled_box_with_one_command(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    done = run("bake", "--resolution", "32", "--quality", "draft")
+    done = run("bake", "--resolution", "32", "--quality", "sketch")
     assert (done.code, done.err) == (0, "")
     folder = tmp_path / "out" / "cornell"
     assert set(digest(folder)) == {"baked.blend", "lightmap.exr", "preview.png", "report.json"}
@@ -164,7 +164,7 @@ def test_texel_density_sets_the_page(run: Run, room: Path, tmp_path: Path) -> No
     sizes = []
     for density in (4, 16):
         out = tmp_path / str(density)
-        words = ("--quality", "draft", "--texel-density", density)
+        words = ("--quality", "sketch", "--texel-density", density)
         assert run("bake", room, "--output", out, *words).code == 0
         sizes.append(read_report(out)["objects"][0]["resolution"][0])
     assert sizes[0] >= 4 * 4  # the floor is 4 m wide

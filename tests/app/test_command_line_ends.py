@@ -191,7 +191,7 @@ def test_ctrl_c_leaves_the_previous_result_whole(
 ) -> None:
     room, out = copied(baked, tmp_path)
     before = digest(out)
-    words = ("--resolution", "64", "--quality", "draft")
+    words = ("--resolution", "64", "--quality", "sketch")
     job = start("bake", room, "--output", out, *words, cwd=tmp_path)
     for line in job.stdout:
         if f"] {stage}" in line:
@@ -227,7 +227,7 @@ def test_a_killed_bake_leaves_the_previous_result_whole(
 ) -> None:
     room, out = copied(baked, tmp_path)
     before = digest(out)
-    words = ("bake", room, "--output", out, "--resolution", "64", "--quality", "draft", "--seed", "5")
+    words = ("bake", room, "--output", out, "--resolution", "64", "--quality", "sketch", "--seed", "5")
     if moment == "publish":
         script = [sys.executable, "-c", KILLED_WHILE_PUBLISHING, str(out), *map(str, words)]
         job = subprocess.run(script, cwd=ROOT, capture_output=True, timeout=300, check=False)

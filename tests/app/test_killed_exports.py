@@ -67,7 +67,8 @@ class Exporter:
         return self.run(True, hook) != 0
 
 
-@pytest.fixture(params=["command line", "panel"])
+# The command line's export takes the same steps on disk.
+@pytest.fixture(params=[pytest.param("command line", marks=pytest.mark.full), "panel"])
 def exporter(request: pytest.FixtureRequest, tmp_path: Path) -> Exporter:
     """Of a small room."""
     if request.param == "command line":

@@ -223,7 +223,14 @@ def waiting_bake(folder: Path) -> subprocess.Popen[str]:
 
 
 @LINUX
-@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL], ids=["Ctrl-C", "kill"])
+@pytest.mark.parametrize(
+    "kill",
+    [
+        pytest.param(signal.SIGINT, id="Ctrl-C"),
+        # Workers wait a minute for the bake; test_shared_bakes.py has a killed bake that goes on.
+        pytest.param(signal.SIGKILL, id="kill", marks=pytest.mark.full),
+    ],
+)
 def test_an_interrupted_bake_leaves_no_worker_and_goes_on(
     kill: signal.Signals, alone: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,7 @@ from .conftest import add_lamp, build_room, digest, read_pixels, read_report, sa
 
 Run = Callable[..., object]
 
-TINY = ("--resolution", "32", "--quality", "draft")
+TINY = ("--resolution", "32", "--quality", "sketch")
 
 EXACT = ("--resolution", "48", "--quality", "high")
 """Which elements are bright enough to be aimed at is the method's to say, so that rays differ, and their

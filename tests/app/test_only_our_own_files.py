@@ -16,7 +16,7 @@ import pytest
 from .conftest import QUICK, add_lamp, add_quad, build_room, digest, read_report, save
 
 Run = Callable[..., object]
-TINY = ("--resolution", "16", "--quality", "draft")
+TINY = ("--resolution", "16", "--quality", "sketch")
 
 posix = pytest.mark.skipif(os.name == "nt", reason="links and devices of POSIX")
 

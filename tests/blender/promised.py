@@ -14,7 +14,7 @@ from radiosity_addon.blender.command_line.main import main
 from tests.reliability.folders import reports
 from tests.reliability.sandbox import build_room
 
-QUICK = ("--resolution", "16", "--quality", "draft", "--min-area", "0.5")
+QUICK = ("--resolution", "16", "--quality", "sketch", "--min-area", "0.5")
 QUAD = ((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
 
 Run = Callable[..., tuple[int, str]]
@@ -43,7 +43,7 @@ def saved_room(folder: Path) -> Path:
 def set_quick(scene: bpy.types.Scene) -> None:
     """Have a scene baked in a moment."""
     settings = scene.radiosity
-    settings.resolution, settings.quality, settings.min_area = 16, "draft", 0.5
+    settings.resolution, settings.quality, settings.min_area = 16, "sketch", 0.5
 
 
 def show_picture(material: str, picture: bpy.types.Image) -> None:

@@ -41,7 +41,7 @@ for inputs, samples in (dict(Specular_IOR_Level=0.0, Alpha=0.5), 16), (dict(Meta
 """
 
 
-@pytest.mark.one_blender  # a minute without a graphics card; the others render in every Blender
+@pytest.mark.full  # a minute without a graphics card; the tests below render fewer materials
 def test_in_eevee_lamps_light_what_shines_and_nothing_else(tmp_path: Path) -> None:
     (paint, lit_paint, matte_paint), (metal, lit_metal, matte_metal) = seen_in_eevee(SHINE, tmp_path).reshape(
         2, 3, 3

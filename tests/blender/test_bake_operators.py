@@ -25,7 +25,7 @@ from radiosity_addon.blender.session.state import session
 from radiosity_addon.blender.settings.properties import look_of
 from radiosity_addon.options.bake_settings import BakeSettings
 
-QUICK = BakeSettings(resolution=32, quality="draft")
+QUICK = BakeSettings(resolution=32, quality="sketch")
 
 
 @pytest.fixture(autouse=True)
@@ -295,6 +295,7 @@ def test_a_file_of_an_earlier_version_that_shows_the_lightmap_alone_says_so(
     assert bpy.context.scene.radiosity.show == "matte"
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("again", [False, True], ids=["first bake", "over an earlier one"])
 def test_closing_the_bake_at_any_step_leaves_everything_as_it_was(tmp_path: Path, again: bool) -> None:
     for obj in list(bpy.data.objects):

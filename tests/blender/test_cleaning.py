@@ -27,7 +27,7 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     add_mesh("Shelf", location=(0, 0, 1), scale=(0.3, 0.3, 1))
     add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
     settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality, settings.atlas = 16, "draft", "per-object"
+    settings.resolution, settings.quality, settings.atlas = 16, "sketch", "per-object"
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "room.blend"))
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
     bpy.ops.wm.save_mainfile()

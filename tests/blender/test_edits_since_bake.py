@@ -271,7 +271,7 @@ def test_scenes_are_compared_with_bakes_of_their_own(room: Path, reads: list[obj
     lamp = bpy.data.objects["Lamp"].copy()
     lamp.data = lamp.data.copy()
     second.collection.objects.link(lamp)
-    second.radiosity.resolution, second.radiosity.quality = 16, "draft"
+    second.radiosity.resolution, second.radiosity.quality = 16, "sketch"
     for energy in (20.0, 40.0):
         lamp.data.energy = energy
         bake()

@@ -32,7 +32,10 @@ def _images(resolution: int = 128) -> SurfaceImages:
     return images
 
 
-@pytest.mark.parametrize("gloss", [Gloss(), Gloss(filtered=1.0), Gloss(reflective=False)])
+@pytest.mark.parametrize(
+    "gloss",
+    [Gloss(), pytest.param(Gloss(filtered=1.0), marks=pytest.mark.one_blender), Gloss(reflective=False)],
+)
 @pytest.mark.parametrize("kind", ZOO)
 def test_evaluated_values_are_those_read_as_constants(kind: str, gloss: Gloss) -> None:
     cycles = bpy.context.scene.cycles

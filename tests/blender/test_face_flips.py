@@ -33,7 +33,7 @@ def floor(registered: None) -> None:
     add_mesh("Floor", scale=(9, 9, 1))
     add_lamp("POINT", energy=900.0, transform={"location": (0, -7, 6)})
     settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality = 32, "draft"
+    settings.resolution, settings.quality = 32, "sketch"
 
 
 def two_boxes(name: str = "Boxes", **transform: object) -> bpy.types.Object:

@@ -23,7 +23,7 @@ from radiosity_addon.blender.relight.relight_scene import run_relight
 from radiosity_addon.blender.session.state import session
 from radiosity_addon.options.bake_settings import BakeSettings
 
-QUICK = BakeSettings(resolution=16, quality="draft")
+QUICK = BakeSettings(resolution=16, quality="sketch")
 
 
 @pytest.fixture(autouse=True)
@@ -76,7 +76,11 @@ def advance(running: Any, to: str) -> None:
             begun = next(running)
 
 
-MOMENTS = ["begin", "export", "worked", "end"]
+MOMENTS = [
+    "begin",
+    *(pytest.param(name, marks=pytest.mark.one_blender) for name in ("export", "worked")),
+    "end",
+]
 
 
 def delete() -> None:

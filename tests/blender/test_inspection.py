@@ -110,7 +110,7 @@ def test_a_file_that_a_bake_would_not_replace_is_named_as_by_the_bake(
 
 def test_files_of_the_last_bake_are_replaced_and_not_odd(tmp_path: Path) -> None:
     room()
-    settings = replace(SETTINGS, resolution=16, quality="draft")
+    settings = replace(SETTINGS, resolution=16, quality="sketch")
     drain(run_bake(bpy.context, settings, OutputFolder(tmp_path)))
     assert (tmp_path / "lightmap.exr").is_file()
     found = inspect(bpy.context, settings, tmp_path, OutputFolder(tmp_path))

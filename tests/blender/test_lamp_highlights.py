@@ -110,7 +110,7 @@ def test_the_next_bake_applies_it_and_a_failed_one_does_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = build_cornell_box()
-    scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
+    scene.radiosity.resolution, scene.radiosity.quality = 32, "sketch"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     switch(False)
     lamp = bpy.data.objects["Lamp"]
@@ -140,7 +140,7 @@ def test_a_linked_lamp_is_named(tmp_path: Path) -> None:
     with bpy.data.libraries.load(str(tmp_path / "lamps.blend"), link=True) as (_, wanted):
         wanted.objects = ["Far"]
     scene.collection.objects.link(wanted.objects[0])
-    scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
+    scene.radiosity.resolution, scene.radiosity.quality = 32, "sketch"
     switch(False)
     bpy.ops.radiosity.bake("EXEC_DEFAULT", True)
     assert "lamp 'Far' is linked, so it still makes highlights" in scene.radiosity.last_bake

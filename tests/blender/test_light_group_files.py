@@ -15,7 +15,7 @@ from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
 
-QUICK = {"resolution": 32, "quality": "draft", "atlas": "per-object", "light_groups": True}
+QUICK = {"resolution": 32, "quality": "sketch", "atlas": "per-object", "light_groups": True}
 
 
 @pytest.fixture(autouse=True)

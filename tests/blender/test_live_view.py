@@ -20,7 +20,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 
 pytestmark = pytest.mark.usefixtures("registered")
 
-QUICK = BakeSettings(resolution=32, quality="draft", method="shooting", elements=60, max_iterations=5)
+QUICK = BakeSettings(resolution=32, quality="sketch", method="shooting", elements=60, max_iterations=5)
 
 
 def pictures(in_background: bool = False) -> list[Picture]:

@@ -78,7 +78,7 @@ def linked(path: Path) -> None:
 
 def test_a_linked_file_with_another_look_is_named(matte_file: Path) -> None:
     scene = build_cornell_box()
-    scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
+    scene.radiosity.resolution, scene.radiosity.quality = 32, "sketch"
     linked(matte_file)
 
     def named() -> bool:

@@ -27,7 +27,7 @@ def room(registered: None, tmp_path: Path) -> Path:
     add_mesh("Box", location=(1, 1, 0.5), scale=(0.2, 0.2, 1))
     add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
     settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality, settings.scope = 32, "draft", "changed"
+    settings.resolution, settings.quality, settings.scope = 32, "sketch", "changed"
     bpy.context.scene.radiosity_relight.only_moved = False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     assert bake() == {"FINISHED"}

@@ -214,7 +214,7 @@ def measured_floor(layers: int, gap: float) -> float:
     shader.inputs["Emission Strength"].default_value = 10
     add("Glow", glow, (0, 0, 0))
     settings = bpy.context.scene.radiosity
-    settings.quality, settings.quantity = "draft", "irradiance"
+    settings.quality, settings.quantity = "sketch", "irradiance"
     # By density, so that the floor's texels do not depend on how many sheets share the page.
     settings.size_mode, settings.texel_density = "density", 10.0
     bake()

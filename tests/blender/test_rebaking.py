@@ -22,7 +22,7 @@ def lightmaps() -> Iterator[dict[str, np.ndarray]]:
     add_mesh("Board", location=(-0.4, 0, 0.4), scale=(0.3, 0.3, 1))
     add_lamp("POINT", "Bulb", {"location": (0.0, 0.0, 1.2)}, energy=40.0, shadow_soft_size=0.1)
     scene = bpy.context.scene
-    scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
+    scene.radiosity.resolution, scene.radiosity.quality = 32, "sketch"
     yield dict(bakes(scene))
     radiosity_addon.unregister()
 

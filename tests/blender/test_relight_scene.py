@@ -66,7 +66,7 @@ def room() -> None:
     empty = add_object("Instancer", None)
     empty.instance_type, empty.instance_collection = "COLLECTION", shown
     scene = bpy.context.scene
-    scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
+    scene.radiosity.resolution, scene.radiosity.quality = 32, "sketch"
     scene.render.resolution_x, scene.render.resolution_y = 32, 24  # of previews
 
 
@@ -303,7 +303,7 @@ def test_the_command_line_keeps_and_relights(folder: Path, tmp_path: Path) -> No
     output = tmp_path / "out"
     plain = changed = tmp_path / "plain.blend"
     shutil.copy(folder / "plain.blend", plain)
-    settings = ["--resolution", "32", "--quality", "draft", "--quiet"]
+    settings = ["--resolution", "32", "--quality", "sketch", "--quiet"]
     assert main(["bake", str(plain), "--output", str(output), "--keep", *settings]) == 0
     sidecar = output / "lightmap.relight"
     kept, picture = sidecar.read_bytes(), (output / "preview.png").read_bytes()
@@ -333,7 +333,7 @@ def test_the_command_line_keeps_and_relights(folder: Path, tmp_path: Path) -> No
 def test_a_sidecar_that_a_later_bake_left_over_is_refused(folder: Path, tmp_path: Path) -> None:
     """It put the earlier bake over the later one."""
     output, plain = tmp_path / "out", str(folder / "plain.blend")
-    settings = ["--resolution", "16", "--quality", "draft", "--quiet"]
+    settings = ["--resolution", "16", "--quality", "sketch", "--quiet"]
     assert main(["bake", plain, "--output", str(output), "--keep", *settings]) == 0
     assert main(["bake", plain, "--output", str(output), "--relight", "--quiet"]) == 0
     assert main(["bake", plain, "--output", str(output), *settings]) == 0

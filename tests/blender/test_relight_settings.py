@@ -16,7 +16,7 @@ def test_options_that_need_a_new_bake_are_named(capfd: pytest.CaptureFixture[str
     add_mesh("Floor")
     add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
     settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality = 32, "draft"
+    settings.resolution, settings.quality = 32, "sketch"
 
     def done(operator: str) -> str:
         capfd.readouterr()

@@ -33,7 +33,7 @@ def test_textures_and_uvs_that_changed_are_noticed(tmp_path: Path, change: str) 
     uv = obj.data.uv_layers.new(name="UVMap")
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=np.float32)
     uv.data.foreach_set("uv", corners[: len(uv.data)].ravel())
-    bpy.context.scene.radiosity.resolution, bpy.context.scene.radiosity.quality = 16, "draft"
+    bpy.context.scene.radiosity.resolution, bpy.context.scene.radiosity.quality = 16, "sketch"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT") == {"FINISHED"}
     bpy.data.objects["Bulb"].data.energy = 50.0

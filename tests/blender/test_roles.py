@@ -139,7 +139,7 @@ def test_what_is_ignored_still_shows_next_to_a_baked_instance(registered: None) 
     add_cube("Left", collection=group, location=(3, 0, 0)).radiosity_mode = "IGNORE"
     add_instance(group, "Here")
     set_world(1, 1, 1)
-    drain(run_bake(bpy.context, BakeSettings(resolution=32, quality="draft"), None))
+    drain(run_bake(bpy.context, BakeSettings(resolution=32, quality="sketch"), None))
     shown = {i.object.name for i in bpy.context.evaluated_depsgraph_get().object_instances if i.show_self}
     assert {"Here/Baked (Lightmap)", "Here/Left (Lightmap)"} <= shown
     assert "Lightmap" not in bpy.data.objects["Here/Left (Lightmap)"].data.uv_layers

@@ -21,7 +21,7 @@ from tests.blender.exporting import add_instance
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
-QUICK = BakeSettings(resolution=32, quality="draft")
+QUICK = BakeSettings(resolution=32, quality="sketch")
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +46,7 @@ def scenes(registered: None) -> tuple[bpy.types.Scene, bpy.types.Scene]:
 def bake(scene: bpy.types.Scene, output: Path | None = None, **settings: object) -> list[tuple[str, str]]:
     """Bake a scene; returns the warnings that name an object."""
     bpy.context.window.scene = scene
-    wanted = BakeSettings(**{"resolution": 32, "quality": "draft", **settings})
+    wanted = BakeSettings(**{"resolution": 32, "quality": "sketch", **settings})
     job = run_bake(bpy.context, wanted, None if output is None else OutputFolder(output, panel_names(scene)))
     while True:
         try:
@@ -159,7 +159,7 @@ def test_an_instance_that_is_not_selected_keeps_its_lightmap(scenes) -> None:
     bpy.ops.object.select_all(action="DESELECT")
     branch.select_set(True)
     first.radiosity.scope = "selected"
-    first.radiosity.resolution, first.radiosity.quality = 32, "draft"
+    first.radiosity.resolution, first.radiosity.quality = 32, "sketch"
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
     assert files_of(bpy.data.objects["Tree/Branch (Lightmap)"]) != before
     restore(bpy.context)
@@ -198,7 +198,7 @@ def test_a_kept_bake_is_relit_after_another_scene_was_baked(scenes) -> None:
     for scene in (first, second):
         bpy.context.window.scene = scene
         settings = scene.radiosity
-        settings.resolution, settings.quality = 32, "draft"
+        settings.resolution, settings.quality = 32, "sketch"
         scene.radiosity_relight.keep = True
         if scene == first:
             # What both show is the second's then, which relighting the first cannot follow.

@@ -73,7 +73,7 @@ def bake_and_render(folder: Path, samples: int, matte: bool = False) -> None:
 
 @pytest.mark.parametrize(
     ("transform", "exposure", "largest"),
-    [("Standard", -0.7, 0.02), ("AgX", 0.5, 0.05), ("Filmic", 0.0, 0.15)],
+    [("Standard", -0.7, 0.02), ("AgX", 0.5, 0.05), pytest.param("Filmic", 0.0, 0.15, marks=pytest.mark.full)],
 )
 def test_the_first_picture_is_the_render(
     tmp_path: Path, transform: str, exposure: float, largest: float

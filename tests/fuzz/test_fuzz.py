@@ -22,11 +22,8 @@ from .scenes import SCENES
 
 ROOT = Path(__file__).resolve().parents[2]
 
-IN_EVERY_BLENDER = 10
-"""Scenes that every run tries, …"""
-
-FIRST = 40
-"""… and those that one with Blender 5.0 tries."""
+IN_EVERY_RUN = 10
+"""Scenes that every run tries."""
 
 BAKED_SEED = 17
 """Its scene can be baked."""
@@ -39,11 +36,11 @@ LAYERED = (20017,)
 """Seeds whose faces lie in one another and once made light."""
 
 BLOCKS = [
-    (0, IN_EVERY_BLENDER),
-    (IN_EVERY_BLENDER, FIRST),
-    *((start, min(start + 100, SCENES)) for start in range(FIRST, SCENES, 100)),
+    (0, IN_EVERY_RUN),
+    (IN_EVERY_RUN, 40),
+    *((start, min(start + 100, SCENES)) for start in range(40, SCENES, 100)),
 ]
-"""Seeds of each test. Those after the second repeat its checks with other scenes, a minute of both cores
+"""Seeds of each test. Those after the first repeat its checks with other scenes, a minute of both cores
 each: they run with `build.py test --full`, and `build.py fuzz` tries more."""
 
 TIMEOUT = 500
@@ -52,11 +49,7 @@ TIMEOUT = 500
 
 @pytest.mark.parametrize(
     ("first", "last"),
-    [
-        BLOCKS[0],
-        pytest.param(*BLOCKS[1], marks=pytest.mark.one_blender),
-        *(pytest.param(*block, marks=pytest.mark.full) for block in BLOCKS[2:]),
-    ],
+    [BLOCKS[0], *(pytest.param(*block, marks=pytest.mark.full) for block in BLOCKS[1:])],
 )
 def test_random_scenes(first: int, last: int) -> None:
     """Processes share the seeds; one that Blender takes down with it is told by its exit code."""

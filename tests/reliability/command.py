@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-QUICK = ("--resolution", "16", "--quality", "draft", "--min-area", "0.2", "--threads", "1")
+QUICK = ("--resolution", "16", "--quality", "sketch", "--min-area", "0.2", "--threads", "1")
 
 MEMORY = 12 << 30
 """Bytes of address space: a net below the program's own refusals."""

@@ -105,7 +105,7 @@ def _prepared(sandbox: Sandbox, name: str) -> Iterator[None]:
         add_foreign(folder)
     build_room()
     settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality, settings.min_area = 16, "draft", 0.5
+    settings.resolution, settings.quality, settings.min_area = 16, "sketch", 0.5
     settings.output_folder = str(sandbox.out)
     bpy.context.scene.radiosity_relight.sidecar = True
     bpy.ops.wm.save_as_mainfile(filepath=str(sandbox.scene))

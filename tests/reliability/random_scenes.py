@@ -180,7 +180,7 @@ def _set_options(random: Random, scene: bpy.types.Scene) -> None:
     """Choose how the scene is baked: in a moment."""
     options = scene.radiosity
     options.resolution = random.choice((8, 8, 12, 16, 24))
-    options.quality, options.min_area, options.error = "draft", 0.5, 0.01
+    options.quality, options.min_area, options.error = "sketch", 0.5, 0.01
     options.threads = 1
     options.atlas = random.choice(("shared", "shared", "shared", "per-object"))
     if options.atlas == "shared":

@@ -29,8 +29,8 @@ def check(tally: Tally, count: int) -> None:
 def test_scenes() -> None:
     """Random scenes, baked, edited and restored."""
     tally = Tally("scenes", None)
-    scenes.run_all(tally, range(8), workers=os.cpu_count() or 1)
-    check(tally, 8)
+    scenes.run_all(tally, range(4), workers=os.cpu_count() or 1)
+    check(tally, 4)
     assert any(entry["outcome"] != "refused" for entry in tally.entries.values())
 
 
@@ -64,7 +64,7 @@ def test_full_disk(tmp_path: Path) -> None:
 
 @LINUX
 def test_failing_calls() -> None:
-    """Every twelfth call of each job, in a process whose audit hooks do not outlive it."""
+    """Every 24th call of each job, in a process whose audit hooks do not outlive it."""
     code = (
         "import os, sys, tempfile, radiosity_addon\n"
         "from pathlib import Path\n"
@@ -73,7 +73,7 @@ def test_failing_calls() -> None:
         "radiosity_addon.register()\n"
         "tally = Tally('calls', None)\n"
         "with tempfile.TemporaryDirectory() as folder:\n"
-        f"    failing_calls.run_all(tally, Path(folder) / 'sandbox', 12, ({errno.ENOSPC},))\n"
+        f"    failing_calls.run_all(tally, Path(folder) / 'sandbox', 24, ({errno.ENOSPC},))\n"
         "code = tally.finish()\n"
         "os._exit(code)\n"
     )

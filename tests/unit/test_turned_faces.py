@@ -38,7 +38,7 @@ class AlwaysLit(BackProbe):
 
 
 def told(scene: BakeScene, **settings: int) -> list[str]:
-    result = run(scene, **settings)
+    result = run(scene, quality="sketch", **settings)
     said = ("is lit from behind", "is inside out on 100% of its surface")
     return sorted(w.name for w in result.warnings if any(text in w.message for text in said))
 
@@ -166,7 +166,7 @@ def partition_that_faces_the_darker_room() -> BakeScene:
 def test_what_cameras_see_only_from_behind_is_turned(
     cameras: tuple[tuple[float, float, float], ...], named: list[str]
 ) -> None:
-    result = run(replace(partition_that_faces_the_darker_room(), cameras=cameras))
+    result = run(replace(partition_that_faces_the_darker_room(), cameras=cameras), quality="sketch")
     found = [(warning.name, warning.turned) for warning in result.warnings if "behind" in warning.message]
     assert found == [(name, (0, 1, 2, 3)) for name in named]
 

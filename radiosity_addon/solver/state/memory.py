@@ -7,11 +7,10 @@ that these split.
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
 from ...base import UsageError
+from ...numerics import thread_count
 from ...scene import Scene
 from ..hierarchy import Hierarchy
 from ..links import LINK_SLACK, MIN_LINKS
@@ -73,7 +72,7 @@ def least_bytes(faces: int, settings: SolverSettings) -> float:
     """Return what faces, their coarsest first links and measuring need [bytes]."""
     pairs = float(faces) ** 2
     links = min(LINK_SLACK * MIN_LINKS, pairs)
-    threads = settings.threads or os.cpu_count() or 1
+    threads = thread_count(settings.threads)
     # A thread measures a chunk of pairs at most; small scenes have no more.
     working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, pairs / MIN_LINKS)
     return faces * FACE_BYTES + links * LINK_BYTES + working
@@ -82,7 +81,7 @@ def least_bytes(faces: int, settings: SolverSettings) -> float:
 def free_bytes(hierarchy: Hierarchy, settings: SolverSettings, light_links: int = 0) -> float:
     """Return what faces, elements, links from lamps and measuring leave of the memory limit."""
     faces = len(hierarchy.faces)
-    threads = settings.threads or os.cpu_count() or 1
+    threads = thread_count(settings.threads)
     taken = FACE_BYTES * faces + ELEMENT_BYTES * (hierarchy.n_elements - faces)
     taken += LIGHT_LINK_BYTES * light_links
     working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, float(faces) ** 2 / MIN_LINKS)

@@ -41,7 +41,7 @@ def test_bakes_from_blenders_command_line(installed: Installed, cornell_blend: P
     output = installed.folder / "baked"
     before = cornell_blend.read_bytes()
     command = ["-b", cornell_blend, "--command", "radiosity", "bake", "--output", output]
-    done = installed.run(*command, "--resolution", "64", "--quality", "draft")
+    done = installed.run(*command, "--resolution", "64", "--quality", "sketch")
     assert done.returncode == 0, done.stdout
     assert cornell_blend.read_bytes() == before
     report = json.loads((output / "report.json").read_text())
@@ -60,7 +60,7 @@ def test_bakes_from_blenders_command_line(installed: Installed, cornell_blend: P
 def test_bakes_the_same_light_as_the_module(
     installed: Installed, cornell_blend: Path, tmp_path: Path
 ) -> None:
-    bake = ["bake", "--resolution", "64", "--quality", "draft", "--quiet", "--output"]
+    bake = ["bake", "--resolution", "64", "--quality", "sketch", "--quiet", "--output"]
     in_blender = installed.folder / "same-light"
     done = installed.run("-b", cornell_blend, "--command", "radiosity", *bake, in_blender)
     assert done.returncode == 0, done.stdout
@@ -75,7 +75,7 @@ def test_another_method_and_the_plot_from_blenders_command_line(
     installed: Installed, cornell_blend: Path
 ) -> None:
     output, plot = installed.folder / "jacobi", installed.folder / "plots" / "jacobi.svg"
-    bake = ["-b", cornell_blend, "--command", "radiosity", "bake", "--resolution", "32", "--quality", "draft"]
+    bake = ["-b", cornell_blend, "--command", "radiosity", "bake", "--resolution", "32", "--quality=sketch"]
     done = installed.run(*bake, "--output", output, "--method", "jacobi", "--elements", "100", "--plot", plot)
     assert done.returncode == 0, done.stdout
     assert json.loads((output / "report.json").read_text())["solver"]["method"] == "jacobi"
@@ -88,7 +88,7 @@ def test_another_method_and_the_plot_from_blenders_command_line(
 def test_restores_from_blenders_command_line(installed: Installed, cornell_blend: Path) -> None:
     baked, restored = installed.folder / "to-restore", installed.folder / "restored.blend"
     bake = ["-b", cornell_blend, "--command", "radiosity", "bake", "--output", baked]
-    assert installed.run(*bake, "--resolution", "32", "--quality", "draft").returncode == 0
+    assert installed.run(*bake, "--resolution", "32", "--quality", "sketch").returncode == 0
     restore = ["-b", baked / "baked.blend", "--command", "radiosity", "restore", "--output", restored]
     done = installed.run(*restore)
     assert done.returncode == 0, done.stdout

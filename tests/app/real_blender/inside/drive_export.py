@@ -57,7 +57,7 @@ def export():
 def script():
     settings = bpy.context.scene.radiosity
     settings.show_result = False
-    settings.resolution, settings.quality = 32, "draft"
+    settings.resolution, settings.quality = 32, "sketch"
     settings.export_web = True
     bpy.ops.radiosity.check()  # or it would come up before the first bake
     yield from invoke(bpy.ops.radiosity.bake)

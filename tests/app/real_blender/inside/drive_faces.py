@@ -47,7 +47,7 @@ def look(name):
 def script():
     view = events.center("WINDOW")
     settings = bpy.context.scene.radiosity
-    settings.quality, settings.resolution, settings.show_result = "draft", 64, False
+    settings.quality, settings.resolution, settings.show_result = "sketch", 64, False
     bpy.data.objects["Tall Block"].data.flip_normals()
     bpy.ops.ed.undo_push(message="Inside Out")
     yield from events.open_sidebar("Radiosity")

@@ -39,7 +39,7 @@ def script():
     opened_section()
     scene = bpy.context.scene
     group = scene.radiosity
-    group.resolution, group.quality, group.use_light_groups = 64, "draft", True
+    group.resolution, group.quality, group.use_light_groups = 64, "sketch", True
     lamp = next(obj for obj in scene.objects if obj.type == "LIGHT")
     active(lamp.name)
     bpy.ops.radiosity.light_group_assign(group="Ceiling")

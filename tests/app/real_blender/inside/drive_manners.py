@@ -139,7 +139,7 @@ def script():
 
     # A second window: what is done there while the first one bakes.
     settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality = 64, "draft"
+    settings.resolution, settings.quality = 64, "sketch"
     for name, edit in (("edited", move_corner), ("deleted", delete), ("undone", undo), ("closed", close)):
         yield from second_window()
         yield from bake_and(name, edit, events.window())

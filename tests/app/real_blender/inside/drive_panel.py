@@ -37,7 +37,7 @@ def lit_objects():
 
 def script():
     view = events.center("WINDOW")
-    bpy.context.scene.radiosity.quality = "draft"
+    bpy.context.scene.radiosity.quality = "sketch"
     bpy.ops.ed.undo_push(message="Settings")
     yield from events.open_sidebar("Radiosity")
     events.screenshot(events.ANSWER.with_name("panel-before.png"))

@@ -39,7 +39,7 @@ def after(name):
 
 def script():
     scene = bpy.context.scene
-    scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
+    scene.radiosity.resolution, scene.radiosity.quality = 32, "sketch"
     scene.radiosity.show_result = False
     bpy.context.view_layer.objects.active = bpy.data.objects["Floor"]
     yield from events.open_sidebar("Radiosity")

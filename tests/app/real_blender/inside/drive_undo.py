@@ -81,7 +81,7 @@ def hit(*keys, **modifiers):
 def script():
     settings = bpy.context.scene.radiosity
     settings.show_result = False
-    settings.resolution, settings.quality = 32, "draft"
+    settings.resolution, settings.quality = 32, "sketch"
     stand_ins()
     bpy.ops.radiosity.check()  # or it would come up before the first bake
     bpy.ops.ed.undo_push(message="Before")
