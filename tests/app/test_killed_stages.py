@@ -105,7 +105,14 @@ def test_a_kill_while_the_spool_is_emptied(removed: int, scene: Path, tmp_path: 
     assert sorted(path.name for path in spool.iterdir()) == ["finished", "over", "spool.json"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGINT, id="Ctrl-C"),
+        # Handled as Ctrl-C is.
+        pytest.param(signal.SIGTERM, id="SIGTERM", marks=pytest.mark.full),
+    ],
+)
 def test_an_interrupted_run_goes_on(number: signal.Signals, scene: Path, tmp_path: Path) -> None:
     spool = tmp_path / "spool"
     assert prepare(scene, spool, SHARED) == 0

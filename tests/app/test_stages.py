@@ -55,7 +55,13 @@ def scene(tmp_path: Path) -> Path:
     return box_file(tmp_path)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, marks=pytest.mark.full if case in {"dense", "residual", "density"} else [])
+        for case in CASES
+    ],
+)
 def test_stages_give_the_bytes_of_a_bake(case: str, scene: Path, tmp_path: Path) -> None:
     options = [*SMALL, *CASES[case]]
     if case == "density":

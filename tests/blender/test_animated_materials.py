@@ -260,6 +260,7 @@ def test_keyframes_on_a_node_that_follows_are_named() -> None:
     assert f"its node '{node.name}' follows the animation of the original" in warning.message
 
 
+@pytest.mark.full  # so does Cycles above, and EEVEE the light mixer in test_light_mixer_eevee.py
 def test_eevee_follows_keyframes(tmp_path: Path) -> None:
     seen = seen_in_eevee(EEVEE, tmp_path)
     expected = np.multiply.outer([0.0, 0.5, 1.0], np.multiply([1.0, 0.5, 0.25], TEXEL))

@@ -41,7 +41,7 @@ for inputs, samples in (dict(Specular_IOR_Level=0.0, Alpha=0.5), 16), (dict(Meta
 """
 
 
-@pytest.mark.full  # a minute without a graphics card; the tests below render fewer materials
+@pytest.mark.full  # a minute without a graphics card; test_shine.py asks it of Cycles
 def test_in_eevee_lamps_light_what_shines_and_nothing_else(tmp_path: Path) -> None:
     (paint, lit_paint, matte_paint), (metal, lit_metal, matte_metal) = seen_in_eevee(SHINE, tmp_path).reshape(
         2, 3, 3
@@ -71,6 +71,7 @@ for metallic in 0.25, 0.75:
 """
 
 
+@pytest.mark.one_blender
 def test_in_eevee_half_a_metal_looks_as_unbaked(tmp_path: Path) -> None:
     seen = seen_in_eevee("import numpy as np\n" + HALF_METAL, tmp_path)
     np.testing.assert_allclose(seen[1::2], seen[::2], rtol=0.01)

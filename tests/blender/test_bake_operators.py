@@ -32,8 +32,7 @@ QUICK = BakeSettings(resolution=32, quality="sketch")
 def box(registered: None) -> bpy.types.Scene:
     """The Cornell box, with the panel set to a quick bake."""
     scene = build_cornell_box()
-    scene.radiosity.resolution = QUICK.resolution
-    scene.radiosity.quality = QUICK.quality
+    scene.radiosity.resolution, scene.radiosity.quality = QUICK.resolution, QUICK.quality
     return scene
 
 

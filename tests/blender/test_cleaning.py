@@ -16,6 +16,8 @@ from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import digest_of_file, read_report, sealed, text_of
 from tests.blender.scenes import add_lamp, add_mesh
 
+pytestmark = pytest.mark.one_blender
+
 
 @pytest.fixture(scope="module")
 def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:

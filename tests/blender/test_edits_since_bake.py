@@ -193,6 +193,7 @@ EDITS: dict[str, tuple[Callable[[], object], str]] = {
 }
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("edit", EDITS)
 def test_edits_are_named(baked: Path, edit: str) -> None:
     """In the file that was baked, and once it was saved and opened again."""

@@ -34,7 +34,13 @@ def _images(resolution: int = 128) -> SurfaceImages:
 
 @pytest.mark.parametrize(
     "gloss",
-    [Gloss(), pytest.param(Gloss(filtered=1.0), marks=pytest.mark.one_blender), Gloss(reflective=False)],
+    [
+        Gloss(),
+        *(
+            pytest.param(gloss, marks=pytest.mark.one_blender)
+            for gloss in (Gloss(filtered=1.0), Gloss(reflective=False))
+        ),
+    ],
 )
 @pytest.mark.parametrize("kind", ZOO)
 def test_evaluated_values_are_those_read_as_constants(kind: str, gloss: Gloss) -> None:

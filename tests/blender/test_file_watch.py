@@ -197,6 +197,7 @@ def test_no_handler_stays() -> None:
     assert [len(each) for each in lists] == before
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("edit", [delete, rename, edit_mesh, undo])
 @pytest.mark.parametrize("at", MOMENTS)
 def test_between_the_steps_of_a_relight_too(edit: Callable[[], None], at: str) -> None:

@@ -60,6 +60,7 @@ look()
 """
 
 
+@pytest.mark.one_blender
 def test_nor_in_eevee(tmp_path: Path) -> None:
     dark, highlight, without = seen_in_eevee(EEVEE, tmp_path)
     assert (highlight > 0.1).all()

@@ -18,6 +18,8 @@ from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 from tests.wording import one_says, says
 
+pytestmark = pytest.mark.one_blender
+
 
 @pytest.fixture(autouse=True)
 def room(registered: None, tmp_path: Path) -> Path:

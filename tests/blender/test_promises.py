@@ -33,7 +33,8 @@ from tests.reliability.folders import broken_result, changes, images_of, listed,
 from tests.reliability.light import lightmap_of
 from tests.reliability.sandbox import add
 
-pytestmark = pytest.mark.usefixtures("registered")
+# Files are the same in every Blender; test_promises_of_scenes.py runs in all.
+pytestmark = [pytest.mark.one_blender, pytest.mark.usefixtures("registered")]
 
 
 @pytest.fixture

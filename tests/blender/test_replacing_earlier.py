@@ -12,7 +12,7 @@ from tests.blender.file_dump import differences_since, tidy_dump
 from tests.blender.hand_bake import bake_by_hand
 from tests.blender.zoo import build_zoo
 
-pytestmark = pytest.mark.usefixtures("record")
+pytestmark = [pytest.mark.one_blender, pytest.mark.usefixtures("record")]
 
 
 @pytest.mark.parametrize("baked_before", [False, True], ids=["first", "again"])

@@ -47,6 +47,7 @@ TIMEOUT = 500
 """Seconds; on an idle machine a block takes a seventh of it."""
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize(
     ("first", "last"),
     [BLOCKS[0], *(pytest.param(*block, marks=pytest.mark.full) for block in BLOCKS[1:])],
