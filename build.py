@@ -49,9 +49,9 @@ usage: python3 build.py VERB [arguments]
   flip SCENE --output FILE   flip faces that show their backs and would be black
   restore SCENE --output FILE  take a bake out of a .blend again
   export DIR [options]       export a bake for browsers and engines
-  test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
+  test [WHICH] ...           run all tests but slow ones that repeat others; what follows goes to pytest
                              --quick: the fast ones that need neither bpy nor a window, in an environment
-                             without bpy, of the newest Python that is here; --full: the slow ones too;
+                             without bpy, of the newest Python that is here; --full: the others, too;
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
