@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ from radiosity_addon.solver.state.memory import (
     FACE_BYTES,
     LIGHT_LINK_BYTES,
     LINK_BYTES,
+    least_bytes,
     link_budget,
     refinable,
 )
@@ -97,6 +99,17 @@ def test_what_does_not_fit_is_refused_before_anything_is_allocated(monkeypatch: 
 def test_a_small_scene_needs_little() -> None:
     state = hierarchical.solve(lit_room(1), SolverSettings(memory_limit=0.01, error=0.01))
     assert state.residual < 1e-4
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no such call here")
+def test_threads_are_counted_by_the_cores_that_may_be_used() -> None:
+    usable = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(usable)})
+        chosen, single = (least_bytes(10**6, SolverSettings(threads=threads)) for threads in (0, 1))
+    finally:
+        os.sched_setaffinity(0, usable)
+    assert chosen == single
 
 
 def test_the_budget_is_what_all_else_leaves() -> None:
