@@ -174,9 +174,7 @@ def test_gray_glass_is_the_same_veil_as_an_opacity() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "method", [pytest.param("two-level", marks=pytest.mark.full), "shooting", "gauss-seidel", "multi-level"]
-)
+@pytest.mark.parametrize("method", ["two-level", "shooting", "gauss-seidel", "multi-level"])
 def test_other_methods_keep_the_power_with_the_mean_of_colors(method: str) -> None:
     room, _ = box_room((2, 1, 1), 2)
     lights = (PointLight((0.5, 0.5, 0.5), (20.0, 20.0, 20.0)),)

@@ -135,6 +135,7 @@ def rounded(soup: Soup, scale: float, away: float) -> Soup:
 
 
 @pytest.mark.parametrize(("away", "spacing"), [(1e3, 6.1e-5), (1e5, 7.8e-3)])
+# One step lies between the two.
 @pytest.mark.parametrize("steps", [0, pytest.param(1, marks=pytest.mark.full), 7])
 def test_so_it_is_far_from_the_origin(away: float, spacing: float, steps: int) -> None:
     """Sheets that are up to 8 float32 spacings apart count once."""

@@ -35,6 +35,7 @@ def made(tmp_path: Path) -> Iterator[ExportScene]:
     radiosity_addon.unregister()
 
 
+# All channels are baked the same way.
 @pytest.mark.parametrize(
     "channel", ["base", *(pytest.param(other, marks=pytest.mark.full) for other in ("emission", "alpha"))]
 )

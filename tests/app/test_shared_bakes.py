@@ -114,6 +114,7 @@ def start_bake(spool: Path, name: str, kernel: str = "", results: int = 0) -> su
     return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True)
 
 
+# Tests below have one worker, too.
 @pytest.mark.parametrize("count", [0, pytest.param(1, marks=pytest.mark.full), 3])
 def test_any_number_of_workers_gives_the_same_bytes(
     count: int,

@@ -58,6 +58,7 @@ def scene(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     "case",
     [
+        # Settings that reach the stages as those of the others do.
         pytest.param(case, marks=pytest.mark.full if case in {"dense", "residual", "density"} else [])
         for case in CASES
     ],

@@ -42,6 +42,7 @@ def baked(place: tuple[float, float, float], scale: float) -> np.ndarray:
     [
         ((7000.0, -7000.0, 1000.0), 1.0),
         ((0.0, 0.0, 0.0), 2500.0),
+        # The next one is as small.
         pytest.param((0.0, 0.0, 0.0), 0.00025, marks=pytest.mark.full),
         ((-0.7, 0.7, 0.1), 0.00025),
     ],

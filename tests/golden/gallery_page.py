@@ -30,7 +30,8 @@ of box and slab are at the upper right.
 **relRMSE** is the root mean square error over all texels, including shadow borders, relative to
 the mean light; two independent references cancel their own noise. The limit is 3 % unless
 another one is given. The **mean** is that of all texels, relative to Cycles'. The golden
-tests bake every row and fail if an error exceeds its limit or differs from the number on this page.
+tests bake the rows, variants of others with `build.py test --full` only, and fail if an error exceeds its
+limit or differs from the number on this page.
 
 `python3 build.py figures gallery` writes this page; the scenes are in `tests/golden/rows`, the
 references and the script that makes them in `tests/golden`.

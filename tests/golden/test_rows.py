@@ -1,4 +1,4 @@
-"""Every row of the gallery against Cycles, texel by texel on the same layout, shadows' borders included."""
+"""The rows of the gallery against Cycles, texel by texel on the same layout, shadows' borders included."""
 
 from __future__ import annotations
 
