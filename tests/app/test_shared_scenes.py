@@ -15,7 +15,7 @@ from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences_since, tidy_dump
 
-QUICK = BakeSettings(resolution=64, quality="sketch")
+QUICK = BakeSettings(resolution=64, quality="draft")
 
 LAMPS = {
     "godot-tests/test01/boxes.blend": ("POINT", (0.0, -1.5, 4.0), 150.0),
