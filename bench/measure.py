@@ -83,7 +83,17 @@ def room(job: dict[str, Any]) -> dict[str, Any]:
     return work(job["triangles"], settings)
 
 
-TASKS = {"prepare": prepare, "cycles": cycles, "ours": ours, "oidn": oidn, "room": room}
+def view(job: dict[str, Any]) -> dict[str, Any]:
+    """Render a case to the file `picture`, lit by the pixels of `lightmap` alone if that is not None."""
+    from .prepare import case_of
+    from .view import render
+
+    lightmap = None if job["lightmap"] is None else Path(job["lightmap"])
+    render(case_of(job), Path(job["folder"]), job["mean"], lightmap, Path(job["picture"]))
+    return {}
+
+
+TASKS = {"prepare": prepare, "cycles": cycles, "ours": ours, "oidn": oidn, "room": room, "view": view}
 
 
 def settings_of(run: dict[str, Any], **more: Any) -> Any:

@@ -127,3 +127,11 @@ def draw_triptych(ours: np.ndarray, reference: np.ndarray, compared: np.ndarray,
     strip = np.concatenate([ours, gap, reference, gap, error], axis=1) * exposure
     shown = (np.clip(strip[::-1], 0, 1) ** (1 / 2.2) * 255 + 0.5).astype(np.uint8)
     Image.fromarray(shown).save(path, optimize=True)
+
+
+def draw_strip(paths: list[Path], target: Path) -> None:
+    """Put pictures of one size side by side."""
+    shown = [np.asarray(Image.open(path).convert("RGB")) for path in paths]
+    gap = np.full((len(shown[0]), 8, 3), 255, dtype=np.uint8)
+    strip = np.concatenate([part for picture in shown for part in (gap, picture)][1:], axis=1)
+    Image.fromarray(strip).save(target, quality=88, optimize=True)

@@ -17,6 +17,7 @@ from bench.curves import (
     time_to_reach,
 )
 from bench.error_measure import error_figures, relative_rmse
+from bench.views import samples_as_long
 
 SAMPLING = [Point(0.5 + 0.01 * n, 1.6 / np.sqrt(n), n) for n in (16, 64, 256)]
 """Half a second and 10 ms a sample; errors of 40 %, 20 % and 10 %."""
@@ -144,3 +145,10 @@ def test_the_uncertainty_is_the_spread_over_references() -> None:
     spread = np.std([figures["error"] for figures in found])
     # References' noise is part of it; that channels err together is allowed for, and here they do not.
     assert 0.5 * spread < np.mean([figures["uncertainty"] for figures in found]) < 2.5 * spread
+
+
+def test_samples_that_take_as_long_are_on_the_line_of_the_measured_ones() -> None:
+    oidn = [{"samples": n, "cpu_seconds": 3.0 + 0.5 * n} for n in (16, 64, 256)]
+    ours = [{"label": label, "cpu_seconds": seconds} for label, seconds in (("draft", 50.0), ("sketch", 2.0))]
+    assert samples_as_long({"ours": ours, "cycles_oidn": oidn}, "draft") == 94
+    assert samples_as_long({"ours": ours, "cycles_oidn": oidn}, "sketch") == 1  # no picture has none
