@@ -13,8 +13,8 @@ from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from .cases import Case
 from .prepare import TEXELS, open_prepared
 
-SHOWN_SAMPLES, TRACED_SAMPLES = 16, 256
-"""Samples a pixel of a lightmap's picture, which has no noise, and of the scene's."""
+SHOWN_SAMPLES, TRACED_SAMPLES = 16, 64
+"""Samples a pixel of a lightmap's picture, which has no noise, and of the scene's, which is denoised."""
 
 HEIGHT = 600
 """Of a picture [px]."""

@@ -74,7 +74,7 @@ def of_coincident(counts: Mapping[str, int]) -> Iterator[BakeWarning]:
     listed = ", ".join(f"{counts[name]:,} of '{name}'" for name in names[:MAX_NAMED])
     others = sum(counts[name] for name in names[MAX_NAMED:])
     if others:
-        listed += f", {others:,} of {len(names) - MAX_NAMED} other objects"
+        listed += f", {others:,} on {len(names) - MAX_NAMED} other objects"
     yield BakeWarning(
         names[0],
         f"triangles in the same place as other faces ({listed}): their lightmaps show the light of each face "

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,7 +33,7 @@ from ..numerics import ArrayFileError, read_arrays, write_arrays
 from .identity import identity
 from .objects import ObjectError, digest_of
 from .signs import refuse_second_bake, take_away, this_process
-from .spool_store import Array, SpoolStore, explained, linked, not_written
+from .spool_store import Array, SpoolStore, explained, is_own, linked, not_written
 
 MAGIC, FORMAT = b"RADIOSITYTASK", 1
 KIND = "radiosity spool"
@@ -168,8 +169,8 @@ class Spool(SpoolStore):
     def _record(self) -> dict[str, Any] | None:
         """Return what a spool says of itself; None if that is not there or damaged."""
         try:
-            record = json.loads((self.path / RECORD).read_bytes())
-        except (OSError, ValueError, RecursionError):
+            record = json.loads(self._read(self.path / RECORD))
+        except (ValueError, RecursionError):  # ObjectError among them
             return None
         return record if isinstance(record, dict) and record.get("kind") == KIND else None
 
@@ -251,6 +252,8 @@ class Spool(SpoolStore):
         """Return what a task found; None, with the file removed, if it is damaged."""
         path = self._at("calls", digest) / f"{task}.result"
         try:
+            if os.path.lexists(path) and not is_own(path):
+                raise ArrayFileError("it is no file of ours")
             return read_arrays(path, MAGIC, FORMAT)
         except FileNotFoundError:
             return None

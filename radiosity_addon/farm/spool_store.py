@@ -6,6 +6,7 @@ Everything is written aside and renamed, and checked by its digest when it is re
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import uuid
 import weakref
@@ -96,8 +97,7 @@ class SpoolStore:
     def _read_array(self, digest: str) -> Array:
         path = self._at("arrays", digest, ".npy")
         try:
-            if path.exists() and not path.is_file():
-                raise ObjectError(f"'{path}' is no file of ours")
+            _check_own(path)
             found = np.load(path, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise ObjectError(f"array {digest}: {error}") from error
@@ -120,7 +120,7 @@ class SpoolStore:
         """Return the digest that a file holds; None if it is not there, or holds none."""
         path = self.path / name
         with contextlib.suppress(OSError, ValueError):
-            if path.is_file():
+            if is_own(path):
                 with path.open("rb") as file:
                     digest = file.read(64).decode().strip()
                 return digest if DIGEST.fullmatch(digest) else None
@@ -142,8 +142,8 @@ class SpoolStore:
 
     def _read(self, path: Path) -> bytes:
         try:
-            # A device or a pipe may have no end.
-            if path.exists() and (not path.is_file() or path.stat().st_size > MOST_BYTES):
+            _check_own(path)
+            if path.exists() and path.stat().st_size > MOST_BYTES:
                 raise ObjectError(f"'{path}' is no file of ours")
             return path.read_bytes()
         except OSError as error:
@@ -151,8 +151,8 @@ class SpoolStore:
 
     def _keep(self, path: Path, content: bytes) -> None:
         """Write a file, if it is not there or damaged."""
-        with contextlib.suppress(OSError):
-            if path.read_bytes() == content:
+        with contextlib.suppress(ObjectError):
+            if self._read(path) == content:
                 return
         self._write(path, content)
         self.input_bytes += len(content)
@@ -177,6 +177,17 @@ class SpoolStore:
                 with contextlib.suppress(OSError):
                     aside.unlink()
                 raise
+
+
+def is_own(path: Path) -> bool:
+    """Return whether a file may be ours: a link may lead out of the spool, a device or a pipe have no end."""
+    return path.is_file() and not path.is_symlink()
+
+
+def _check_own(path: Path) -> None:
+    """Refuse what is there and is no file of ours. Raises ObjectError."""
+    if os.path.lexists(path) and not is_own(path):
+        raise ObjectError(f"'{path}' is no file of ours")
 
 
 def linked(path: Path) -> BakeError:

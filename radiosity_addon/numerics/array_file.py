@@ -162,11 +162,11 @@ def _opened(path: Path) -> BinaryIO:
 
 def _check_head(content: bytes, magic: bytes, format_number: int) -> tuple[bytes, int]:
     """Return the digest and the description's length that a file's first bytes hold."""
+    if not magic.ljust(16, b"\0").startswith(content[:16]):
+        raise ArrayFileError("it is not a sidecar")
     if len(content) < _HEAD.size:
         raise ArrayFileError("it is incomplete")
-    kind, found, digest, length = _HEAD.unpack_from(content)
-    if kind != magic.ljust(16, b"\0"):
-        raise ArrayFileError("it is not a sidecar")
+    _, found, digest, length = _HEAD.unpack_from(content)
     if found != format_number:
         raise ArrayFileError(f"it has format {found}, and this version reads format {format_number}")
     return digest, length

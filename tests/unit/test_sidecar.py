@@ -109,6 +109,8 @@ def test_damaged_and_missing_sidecars_are_refused_in_one_line(path: Path) -> Non
         (content[:30], "incomplete"),
         (content[:-1] + bytes([content[-1] ^ 1]), "damaged"),
         (b"PK" + content[2:], "not a sidecar"),
+        (b"my notes", "not a sidecar"),
+        (content[:20], "incomplete"),
         (content[:16] + bytes([FORMAT + 1]) + content[17:], f"format {FORMAT + 1}"),
     ):
         path.write_bytes(wrong)

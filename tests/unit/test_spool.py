@@ -194,6 +194,32 @@ def test_calls_that_are_links_are_neither_worked_at_nor_emptied(spool: Spool, tm
     assert sorted(path.name for path in mine.iterdir()) == ["0.claim", "call.json"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights here")
+def test_files_that_are_links_are_not_read(spool: Spool, tmp_path: Path) -> None:
+    """Not even if what they lead to is what was written: nothing outside is read."""
+    array, text = np.arange(300.0), "[1]"
+    digest, name, call = spool.put_array(array), digest_of(text), spool.put_call(CALL)
+    spool.put_object(name, text)
+    spool.put_result(call, 0, None, [])
+    files = [f"arrays/{digest}.npy", f"objects/{name}.json", f"calls/{call}/0.result", "open", "spool.json"]
+    for number, file in enumerate(files):
+        (spool.path / file).rename(tmp_path / str(number))
+        (spool.path / file).symlink_to(tmp_path / str(number))
+    other = Spool(spool.path)
+    for read in (lambda: other.array(digest), lambda: other.object(name)):
+        with pytest.raises(ObjectError, match="no file of ours"):
+            read()
+    assert other.result(call, 0) is None
+    assert other.open_call() is None
+    with pytest.raises(BakeError, match="is damaged"):
+        Spool.to_work(spool.path)
+    other.put_array(array)
+    other.put_object(name, text)
+    np.testing.assert_array_equal(other.array(digest), array)
+    assert other.object(name) == text
+    assert np.load(tmp_path / "0").sum() == array.sum()
+
+
 def test_other_machines_see_a_bake_through_all_of_its_stages(
     spool: Spool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -209,7 +209,7 @@ def put(spool: Spool, tree: Any) -> str:
 )
 def test_pointers_that_lead_nowhere_are_refused(content: bytes, spool: Spool, prepared: PreparedBake) -> None:
     (spool.path / "results" / prepared.inputs).write_bytes(content)
-    with pytest.raises(BakeError, match=r"is damaged: run the bake again|has no result yet"):
+    with pytest.raises(BakeError, match="is damaged: run the bake again"):
         result_in(spool, prepared)
     (spool.path / "prepared").write_bytes(content)
     with pytest.raises(BakeError, match=r"is damaged.*: prepare it again"):
