@@ -1,7 +1,7 @@
-"""A room as two bakes and a path tracer show it: `python3 -m bench.views --case living-room`.
+"""A room as two bakes and a path tracer show it: `python3 -m bench.views --case apartment`.
 
-From left to right: our bake, Cycles' bake with Open Image Denoise in the same processor time, and a picture
-that Cycles traced. How many samples take as long follows from the case's results; both bakes are made anew.
+From left to right: our bake on our UVs, Cycles' bake with Open Image Denoise in the same processor time on
+those of Smart UV Project, which suit it, and a picture that Cycles traced.
 """
 
 from __future__ import annotations
@@ -17,9 +17,12 @@ import numpy as np
 from . import pictures
 from .__main__ import DEFAULT_CACHE, ROOT
 from .cases import CASES
-from .compare import Bench, Prepared, cycles_bake, denoise, our_bake, prepare, say
+from .compare import SEED, Bench, Prepared, prepare, say
 
 RESULTS = ROOT / "bench" / "results"
+
+WITH_BOTH = sorted(name for name in CASES if f"{name}-smart" in CASES)
+"""Cases that are laid out both ways."""
 
 
 def draw_views(bench: Bench, name: str, quality: str) -> Path:
@@ -30,18 +33,28 @@ def draw_views(bench: Bench, name: str, quality: str) -> Path:
     FileNotFoundError
         If the case has no results that tell how many samples take as long.
     """
-    prepared = prepare(bench, CASES[name])
-    samples = samples_as_long(json.loads((RESULTS / f"{name}.json").read_text()), quality)
-    folder = prepared.folder / "views"
-    folder.mkdir(exist_ok=True)
-    ours = our_bake(bench, prepared, {"quality": quality}, folder / "ours.npy")
-    noisy = cycles_bake(bench, prepared, samples, folder / "cycles.npy")
-    denoised = denoise(bench, prepared, noisy, folder / "cycles.npy")
-    with np.load(folder / f"oidn-{samples}.npz") as pages:
-        np.save(folder / "denoised.npy", pages[denoised["filter"]])
-    seconds = [entry["cpu_seconds"] for entry in (ours, denoised)]
-    say(f"{name}: {seconds[0]:.0f} s of ours, {seconds[1]:.0f} s of Cycles, {samples} samples")
-    shown = [_seen(bench, prepared, folder, lightmap) for lightmap in ("ours.npy", "denoised.npy", None)]
+    prepared, other = prepare(bench, CASES[name]), CASES[f"{name}-smart"]
+    measured = json.loads((RESULTS / f"{name}.json").read_text())
+    samples, theirs = samples_as_long(measured, quality), bench.cache / other.key()
+    if not (theirs / "texels.npz").is_file():
+        bench.run("prepare", 30, case=other.name, folder=theirs)
+    made = prepared.folder / "views"
+    made.mkdir(exist_ok=True)
+    ours, noisy, clean = made / "ours.npy", made / "cycles.npy", made / "oidn.npz"
+    times = [
+        bench.run("ours", 30, case=name, folder=prepared.folder, run={"quality": quality}, pixels=ours),
+        bench.run("cycles", 30, case=other.name, folder=theirs, samples=samples, seed=SEED, pixels=noisy),
+    ]
+    bench.run("oidn", 30, noisy=noisy, texels=theirs / "texels.npz", pixels=clean)
+    with np.load(clean) as pages:
+        np.save(made / "denoised.npy", pages[measured["cycles_oidn"][-1]["filter"]])
+    ours_s, theirs_s = (each["cpu_seconds"] for each in times)
+    say(f"{name}: {ours_s:.0f} s of ours, {theirs_s:.0f} s of {samples} samples")
+    shown = [
+        _seen(bench, prepared, name, prepared.folder, ours),
+        _seen(bench, prepared, other.name, theirs, made / "denoised.npy"),
+        _seen(bench, prepared, name, prepared.folder, None),
+    ]
     target = bench.output / f"{name}-view.jpg"
     pictures.draw_strip(shown, target)
     return target
@@ -55,18 +68,17 @@ def samples_as_long(results: dict[str, Any], quality: str) -> int:
     return max(1, round((ours - fixed) / slope))
 
 
-def _seen(bench: Bench, prepared: Prepared, folder: Path, lightmap: str | None) -> Path:
+def _seen(bench: Bench, prepared: Prepared, case: str, folder: Path, lightmap: Path | None) -> Path:
     """Return the picture of a lightmap, or of the scene itself."""
-    target = folder / f"{Path(lightmap).stem if lightmap else 'traced'}.png"
+    target = prepared.folder / "views" / f"{lightmap.stem if lightmap else 'traced'}.png"
     mean = float(prepared.mean[prepared.compared].mean())
-    job = {"case": prepared.case.name, "folder": prepared.folder, "mean": mean, "picture": target}
-    bench.run("view", 60, **job, lightmap=folder / lightmap if lightmap else None)
+    bench.run("view", 60, case=case, folder=folder, mean=mean, lightmap=lightmap, picture=target)
     return target
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--case", required=True, choices=sorted(CASES))
+    parser.add_argument("--case", required=True, choices=WITH_BOTH)
     parser.add_argument("--quality", default="draft")
     parser.add_argument("--output", type=Path, default=RESULTS)
     chosen = parser.parse_args()

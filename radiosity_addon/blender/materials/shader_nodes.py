@@ -175,7 +175,9 @@ def _image(node: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) ->
         raise MissingImageError("an image texture without an image")
     mean = image_mean(image, equirectangular=node.type == "TEX_ENVIRONMENT")
     if mean is None:
-        raise MissingImageError(f"image '{image.name}', which has no pixels and is shown in magenta (is its file missing?)")
+        raise MissingImageError(
+            f"image '{image.name}', which has no pixels and is shown in magenta (is its file missing?)"
+        )
     rgb = np.full(3, mean[3]) if output.name == "Alpha" else mean[:3]
     return Value(rgb, (f"image '{image.name}'",))
 
