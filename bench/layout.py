@@ -10,6 +10,12 @@ from radiosity_addon.lightmap.unwrap.atlas import AtlasInput, run_atlas
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 
+WELDED = 1e-6
+"""Vertices so near each other are one for Smart UV Project [m]."""
+
+CORNER = "original_corner"
+"""Attribute of a welded mesh: the corner of the original one."""
+
 
 def lay_out(resolution: int) -> dict[str, np.ndarray]:
     """Return each object's lightmap UVs by mesh corner, as a bake of the open scene lays them out."""
@@ -35,17 +41,38 @@ def write_layout(uv: dict[str, np.ndarray]) -> None:
 
 
 def project_smart(scene: bpy.types.Scene, resolution: int) -> None:
-    """Lay out the scene's lightmap UVs anew by Blender's Smart UV Project, with a texel between islands."""
+    """Lay out the scene's lightmap UVs anew by Blender's Smart UV Project, with a texel between islands.
+
+    Its islands are of faces that share vertices. Those of flattened scenes share none: it gets welded copies.
+    """
     layer = bpy.context.view_layer
     objects = objects_with_layout(scene)
+    meshes = [obj.data for obj in objects]
     for obj in scene.objects:
         obj.select_set(obj in objects)
+    for obj in objects:
+        obj.data = obj.data.copy()
+        corners = obj.data.attributes.new(CORNER, "INT", "CORNER")
+        corners.data.foreach_set("value", np.arange(len(obj.data.loops), dtype=np.int32))
     layer.objects.active = objects[0]
     bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.remove_doubles(threshold=WELDED)
     bpy.ops.mesh.select_all(action="SELECT")
     # Of its margins, the one that fills the most of the page (a third of it in the classroom).
     bpy.ops.uv.smart_project(island_margin=0.5 / resolution, margin_method="ADD")
     bpy.ops.object.mode_set(mode="OBJECT")
+    for obj, mesh in zip(objects, meshes, strict=True):
+        welded, obj.data = obj.data, mesh
+        corner = np.empty(len(welded.loops), dtype=np.int32)
+        welded.attributes[CORNER].data.foreach_get("value", corner)
+        found = np.empty((len(welded.loops), 2), dtype=np.float32)
+        welded.uv_layers[LIGHTMAP_UV_LAYER].data.foreach_get("uv", found.reshape(-1))
+        # Faces that welding has removed have no area, and get none on the page.
+        uv = np.zeros((len(mesh.loops), 2), dtype=np.float32)
+        uv[corner] = found
+        mesh.uv_layers[LIGHTMAP_UV_LAYER].data.foreach_set("uv", uv.reshape(-1))
+        bpy.data.meshes.remove(welded)
 
 
 def objects_with_layout(scene: bpy.types.Scene) -> list[bpy.types.Object]:
