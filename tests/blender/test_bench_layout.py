@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import pytest
 
 from bench.layout import CORNER, project_smart
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
@@ -12,6 +13,7 @@ CUBE = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range
 SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
 
+@pytest.mark.one_blender
 def test_smart_islands_are_faces_of_meshes_whose_triangles_share_no_vertices() -> None:
     """Each side of a cube of single triangles is one island, and the mesh stays as it was."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
