@@ -75,8 +75,9 @@ def on_files(files: Any, config: Any) -> Any:
     """Add the pages of the repository's root, and the benchmarks' pictures."""
     for name, uri in ROOT_PAGES.items():
         files.append(File.generated(config, uri, content=(ROOT / name).read_text(encoding="utf-8")))
-    for picture in sorted((ROOT / RESULTS).glob("*.png")):
-        files.append(File.generated(config, RESULTS + picture.name, abs_src_path=str(picture)))
+    for picture in sorted((ROOT / RESULTS).iterdir()):
+        if picture.suffix in (".png", ".jpg"):
+            files.append(File.generated(config, RESULTS + picture.name, abs_src_path=str(picture)))
     return files
 
 
