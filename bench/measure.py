@@ -85,8 +85,8 @@ def room(job: dict[str, Any]) -> dict[str, Any]:
 
 def view(job: dict[str, Any]) -> dict[str, Any]:
     """Render a case to the file `picture`, lit by the pixels of `lightmap` alone if that is not None."""
+    from .camera_view import render
     from .prepare import case_of
-    from .view import render
 
     lightmap = None if job["lightmap"] is None else Path(job["lightmap"])
     render(case_of(job), Path(job["folder"]), job["mean"], lightmap, Path(job["picture"]))
