@@ -118,7 +118,7 @@ class Case:
             else [self.lamp.kind, self.lamp.place, self.lamp.energy, self.lamp.radius]
         )
         if self.smart_uvs:
-            about.append("smart, welded")
+            about.append("smart, soups welded")
         digest.update(json.dumps(about, sort_keys=True).encode())
         return f"{self.name}-{self.resolution}-{digest.hexdigest()[:12]}"
 

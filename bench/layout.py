@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -43,7 +44,8 @@ def write_layout(uv: dict[str, np.ndarray]) -> None:
 def project_smart(scene: bpy.types.Scene, resolution: int) -> None:
     """Lay out the scene's lightmap UVs anew by Blender's Smart UV Project, with a texel between islands.
 
-    Its islands are of faces that share vertices. Those of flattened scenes share none: it gets welded copies.
+    Its islands are of faces that share vertices. Flattened meshes share none: it gets welded copies of
+    them. Others stay as they are: of boxes that touch, welded into one, it lays islands over each other.
     """
     layer = bpy.context.view_layer
     objects = objects_with_layout(scene)
@@ -54,10 +56,10 @@ def project_smart(scene: bpy.types.Scene, resolution: int) -> None:
         obj.data = obj.data.copy()
         corners = obj.data.attributes.new(CORNER, "INT", "CORNER")
         corners.data.foreach_set("value", np.arange(len(obj.data.loops), dtype=np.int32))
+        if len(obj.data.vertices) == len(obj.data.loops):
+            _weld(obj.data)
     layer.objects.active = objects[0]
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.mesh.remove_doubles(threshold=WELDED)
     bpy.ops.mesh.select_all(action="SELECT")
     # Of its margins, the one that fills the most of the page (a third of it in the classroom).
     bpy.ops.uv.smart_project(island_margin=0.5 / resolution, margin_method="ADD")
@@ -73,6 +75,15 @@ def project_smart(scene: bpy.types.Scene, resolution: int) -> None:
         uv[corner] = found
         mesh.uv_layers[LIGHTMAP_UV_LAYER].data.foreach_set("uv", uv.reshape(-1))
         bpy.data.meshes.remove(welded)
+
+
+def _weld(mesh: bpy.types.Mesh) -> None:
+    """Make vertices in the same place one."""
+    welded = bmesh.new()
+    welded.from_mesh(mesh)
+    bmesh.ops.remove_doubles(welded, verts=welded.verts[:], dist=WELDED)
+    welded.to_mesh(mesh)
+    welded.free()
 
 
 def objects_with_layout(scene: bpy.types.Scene) -> list[bpy.types.Object]:

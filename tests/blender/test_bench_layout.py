@@ -6,7 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
+from bench.interior.furniture import bookcase
 from bench.layout import CORNER, project_smart
+from radiosity_addon.lightmap.texels import coverage_sum
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 
 CUBE = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)], dtype=float)
@@ -40,3 +42,22 @@ def test_smart_islands_are_faces_of_meshes_whose_triangles_share_no_vertices() -
     areas = np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / 2
     np.testing.assert_allclose(areas, areas[0], rtol=1e-3)
     assert areas.sum() > 0.3
+
+
+@pytest.mark.one_blender
+def test_boxes_that_touch_stay_apart() -> None:
+    """Of a bookcase, whose books and boards touch, no island covers another."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    shape = bookcase(np.random.default_rng(0))
+    mesh = bpy.data.meshes.new("Bookcase")
+    mesh.from_pydata(shape.vertices.tolist(), [], shape.faces)
+    mesh.uv_layers.new(name=LIGHTMAP_UV_LAYER)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Bookcase", mesh))
+
+    project_smart(bpy.context.scene, 512)
+
+    uv = np.empty((len(mesh.loops), 2), dtype=np.float32)
+    mesh.uv_layers[LIGHTMAP_UV_LAYER].data.foreach_get("uv", uv.reshape(-1))
+    mesh.calc_loop_triangles()
+    triangles = np.array([uv[triangle.loops] for triangle in mesh.loop_triangles])
+    assert coverage_sum(triangles, 512).max() <= 1.01
