@@ -159,8 +159,11 @@ def light_texels(
 
 
 def _give_back(geometry: TexelGeometry) -> None:
-    """Give back what a step freed, unless memory is short: the budget counts it as used by the next one."""
-    if not geometry.scratch.in_files:
+    """Give back what a step freed, unless arrays of the next one would take it: its temporaries need it.
+
+    They would not where memory is ample, nor where there is none left for arrays.
+    """
+    if not geometry.scratch.in_files or geometry.scratch.room() <= 0:
         give_back()
 
 

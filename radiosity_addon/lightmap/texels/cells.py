@@ -73,7 +73,8 @@ class TexelCells:
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
         # From the texels, as in `SpreadPoints`.
         self._own_anchors = geometry.scratch.empty((len(self.texel), OWN, 3), np.float32)
-        self._below = np.zeros((len(self.texel), CELLS_PER_TEXEL), dtype=bool)
+        self._below = np.zeros(len(self.texel), dtype=np.uint32)
+        """(d,) A bit for each of a texel's cells: whether it is below a hood."""
         place = partial(_anchors, geometry, elements.caster, self._rim, self.texel)
         into = (self._own_anchors, self._below)
         fill_chunks(place, into, len(self.texel), CHUNK_TEXELS, elements.threads)
@@ -113,7 +114,7 @@ class TexelCells:
                 break
             cell = square[waiting].argmin(axis=1)
             square[waiting, cell] = np.inf
-            seen = self._below[rank[waiting], first[waiting] + cell] == below[waiting]
+            seen = self._hooded(rank[waiting], first[waiting] + cell) == below[waiting]
             alike = np.flatnonzero(seen)
             asking = waiting[alike]
             seen[alike] = free_segment(caster, position[asking], anchors[asking, cell[alike]])
@@ -126,7 +127,7 @@ class TexelCells:
         """Return cells as footprints: their samples see the anchor."""
         geometry, texel, anchor = self._geometry, self.texel_of(cell), self._anchor(cell)
         part = (cell % CELLS_PER_TEXEL).astype(np.uint8)
-        cells = _ChosenCells(texel, part, anchor, self._below[cell // CELLS_PER_TEXEL, part])
+        cells = _ChosenCells(texel, part, anchor, self._hooded(cell // CELLS_PER_TEXEL, part))
         sample = partial(_sample, geometry, self.elements.caster, self._rim, cells)
         normal = TakenRows(geometry.normal, texel)
         return Footprints(anchor, normal, self._keys(cell), sample, starts=STARTS)
@@ -141,6 +142,10 @@ class TexelCells:
         expected = self.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         normal = TakenRows(geometry.normal, texel)
         return Footprints(self._anchor(cell), normal, self._keys(cell), expected=expected)
+
+    def _hooded(self, rank: Array, part: Array) -> Array:
+        """Return (p,) bool: whether parts of the divided texels of these ranks are below a hood."""
+        return np.asarray(self._below[rank] >> part.astype(np.uint32) & 1 == 1)
 
     def _anchor(self, cell: Array) -> Array:
         """Return (p, 3) the anchors of cells, not lifted."""
@@ -198,13 +203,14 @@ def _sample(
 def _anchors(
     geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, rows: slice
 ) -> tuple[Array, Array]:
-    """Return (r, 16, 3) from texels to their cells' lifted anchors, and (r, 32) which of all are hooded."""
+    """Return (r, 16, 3) from texels to their cells' lifted anchors, and (r,) uint32 which are hooded."""
     texel = texel[rows]
     spots = np.broadcast_to(_SPOTS, (len(texel), OWN, 2))
     spread = geometry.sample(texel, spots, 1.0)
     both = np.concatenate([spread, geometry.in_plane(texel, spots)], axis=1)
     anchor = spread + _lifted(geometry, caster, texel)[:, None]
-    return anchor - geometry.position[texel][:, None], _below_rim(geometry, caster, rim, texel, both)
+    below = np.packbits(_below_rim(geometry, caster, rim, texel, both), axis=1, bitorder="little")
+    return anchor - geometry.position[texel][:, None], below.view("<u4")[:, 0]
 
 
 def _pixel_anchors(geometry: TexelGeometry, caster: RayCaster, texel: Array) -> Array:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, Scratch, across, marked, tiles
+from ...numerics import Array, Scratch, across, marked, row_numbers, tiles
 from ...solver.gather import LightGains, joined_gains
 from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
@@ -23,8 +23,11 @@ RAYS_OF_MET = ((1, 4), (8, 16), (32, 64))
 """A cell that so many rays met, or more, gathers with so many of its own. Were m rays that met it all of one
 point's n, a cell of r rays would add m² / (n r) of the point's own variance to it."""
 
-MOST_MET = 255
-"""Rays that met a cell, beyond which it makes no difference how many: what a byte holds."""
+MOST_MET = 127
+"""Rays that met a cell, beyond which it makes no difference how many."""
+
+GATHERED = 128
+"""Added to the number of rays that met a cell once it has gathered: both fit into a byte."""
 
 RAYS_PER_SHADOW_RAY = 4
 """Gather rays of a cell for each shadow ray to a lamp."""
@@ -41,7 +44,7 @@ SWEEPS = 4
 class SubCellLinks:
     """What p cells of one kind, that gather with as many rays, see.
 
-    rows (p,) int64: Theirs in the table of radiosity.
+    rows (p,) int32: Theirs in the table of radiosity.
     sources (p, rays) int32: Rows of the table, and negative numbers as in `GatherLinks`.
     reflectance (p, 3) float64
     lamps (p, 3) float64: Irradiance straight from lamps and emissive faces [W/m²].
@@ -77,7 +80,7 @@ class SubCellHits:
     """Cells of one kind that have gathered.
 
     of_element: Whether they are of elements, or of texels.
-    number (p,) int: Theirs in a `HitTable`.
+    number (p,) int32: Theirs in a `HitTable`.
     sources (p, rays) int32: Numbers of what they hit.
     gains: What lights add, if that is known as well.
     tints (p, rays, 3) float16: As in `GatherLinks`.
@@ -177,9 +180,8 @@ class _SubCellGather:
     def __init__(self, table: HitTable, most_rays: int, known: Sequence[SubCellHits] = ()) -> None:
         self._table, self._first, self._most_rays = table, table.texel_count, most_rays
         self._scratch = table.geometry.scratch
-        self._met = np.zeros(table.end - self._first, dtype=np.uint8)
-        """Of every number how often it was met, up to `MOST_MET`."""
-        self._gathered = np.zeros(len(self._met), dtype=bool)
+        self._state = np.zeros(table.end - self._first, dtype=np.uint8)
+        """Of every number how often it was met, up to `MOST_MET`, and whether it has `GATHERED`."""
         self._found: dict[tuple[bool, int], _FoundCells] = {}
         self._known = [(hits, np.zeros(len(hits.number), dtype=bool)) for hits in known]
 
@@ -189,20 +191,21 @@ class _SubCellGather:
             number = sources[tile]
             # Few of all cells are met by a tile: sums over all of them would take longer than to sort it.
             cells, met = np.unique(number[number >= self._first] - self._first, return_counts=True)
-            self._met[cells] = np.minimum(self._met[cells] + met, MOST_MET)
+            state = self._state[cells]
+            self._state[cells] = np.minimum((state & MOST_MET) + met, MOST_MET) | (state & GATHERED)
 
     def forget_coarse(self) -> None:
         """Forget the known cells that were met so often by now that they should have more rays."""
         for number, (hits, _) in enumerate(self._known):
-            kept = self._rays(self._met[hits.number - self._first]) <= hits.rays
+            kept = self._rays(self._state[hits.number - self._first]) <= hits.rays
             self._known[number] = hits.take(kept), np.zeros(int(kept.sum()), dtype=bool)
 
-    def _rays(self, met: Array) -> Array:
-        """Return (p,) uint16: with how many rays cells gather, by how often they were met, uint8."""
+    def _rays(self, state: Array) -> Array:
+        """Return (p,) uint16: with how many rays cells gather, by how often they were met."""
         step = np.searchsorted([least for least, _ in RAYS_OF_MET], np.arange(MOST_MET + 1), side="right") - 1
         rays = np.array([rays for _, rays in RAYS_OF_MET], dtype=np.uint16)[np.maximum(step, 0)]
         # Looked up: there may be millions, while memory is short.
-        return np.asarray(np.minimum(rays, self._most_rays).astype(np.uint16)[met])
+        return np.asarray(np.minimum(rays, self._most_rays).astype(np.uint16)[state & MOST_MET])
 
     def take_known(self) -> None:
         """Take the known cells that were met, and those that these met in turn.
@@ -214,21 +217,23 @@ class _SubCellGather:
             more = False
             for hits, taken in self._known:
                 cell = hits.number - self._first
-                met = np.flatnonzero(~taken & (self._met[cell] > 0))
+                met = np.flatnonzero(~taken & (self._state[cell] > 0))
                 if len(met):
-                    more = taken[met] = self._gathered[cell[met]] = True
+                    more = taken[met] = True
+                    self._state[cell[met]] |= GATHERED
                     self.count(hits.sources[met])
 
     def gather_new(self, progress: Progress) -> bool:
         """Gather from the cells that were met and have not gathered yet; return whether there were any."""
-        new = [
-            tile.start + np.flatnonzero((self._met[tile] > 0) & ~self._gathered[tile])
-            for tile in tiles(len(self._met))
-        ]
-        number = np.concatenate(new or [np.zeros(0, dtype=np.int64)])
-        self._gathered[number] = True
-        rays_of = self._rays(self._met[number])
-        number += self._first
+        numbers, rays_of_tile = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.uint16)]
+        for tile in tiles(len(self._state)):
+            state = self._state[tile]
+            new = np.flatnonzero((state > 0) & (state < GATHERED))
+            numbers.append((self._first + tile.start + new).astype(np.int32))
+            rays_of_tile.append(self._rays(state[new]))
+            state[new] |= GATHERED
+        number, rays_of = np.concatenate(numbers), np.concatenate(rays_of_tile)
+        del numbers, rays_of_tile
         is_elements = number < self._table.first_cell
         groups = [
             (of_element, rays)
@@ -251,9 +256,9 @@ class _SubCellGather:
         """
         table = self._table
         first, first_cell = table.first_small - self._first, table.first_cell - self._first
-        met = np.flatnonzero(self._met[first:first_cell]) + table.first_small
-        of_texels = np.flatnonzero(self._gathered[first_cell:]) + table.first_cell
-        return np.concatenate([met, of_texels], dtype=np.int32, casting="same_kind")
+        met = row_numbers(self._state[first:first_cell] > 0) + np.int32(table.first_small)
+        of_texels = row_numbers(self._state[first_cell:] >= GATHERED) + np.int32(table.first_cell)
+        return np.concatenate([met, of_texels])
 
     def links(self, rows: TableRows, reflectance: Array, progress: Progress) -> list[SubCellLinks]:
         """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""
@@ -307,12 +312,12 @@ class _FoundCells:
         if self._tints is not None:
             tints = self._tints.more(len(number)).reshape(len(number), self._rays, 3)
         self._table.gather(number, self._of_element, self._rays, (sources, tints), progress)
-        self._numbers.append(number.astype(np.int32))
+        self._numbers.append(number)
         return sources
 
     def all(self) -> SubCellHits:
         """Return all that gathered."""
-        number, sources = np.concatenate(self._numbers, dtype=np.int64), self._sources.all()
+        number, sources = np.concatenate(self._numbers), self._sources.all()
         tints = None if self._tints is None else self._tints.all().reshape(*sources.shape, 3)
         return SubCellHits(self._of_element, number, sources, tints=tints)
 
@@ -352,7 +357,10 @@ class SubCellSweeps:
         """Mark the cells that see something marked in a (table rows,) mask; False if they all were."""
         more = False
         for links in self._links:
-            dark = np.flatnonzero(~reached[links.rows])
+            unseen = np.empty(len(links.rows), dtype=bool)
+            for tile in tiles(len(unseen)):
+                unseen[tile] = ~reached[links.rows[tile]]
+            dark = row_numbers(unseen)
             seen = [
                 dark[tile][across(np.logical_or, reached[links.sources[dark[tile]]])]
                 for tile in tiles(len(dark))
