@@ -25,6 +25,7 @@ import numpy.typing as npt
 
 from ..base import BakeError
 from .arrays import Array
+from .heap import give_back
 
 MIN_FILE_BYTES = 1 << 20
 """Smaller arrays stay in memory, and are not counted [bytes]."""
@@ -83,6 +84,14 @@ class Scratch:
         """Return the memory that further arrays may use [bytes]."""
         left = self.budget - self.in_memory
         return left if self.free is None else min(left, self.free())
+
+    def give_back(self) -> None:
+        """Give back what a step freed, unless arrays of the next one would take it: its temporaries need it.
+
+        They would not where memory is ample, nor where there is none left for arrays.
+        """
+        if not self.in_files or self.room() <= 0:
+            give_back()
 
     def rows(self, width: int, dtype: npt.DTypeLike) -> Rows:
         """Return a table that grows by blocks of rows."""

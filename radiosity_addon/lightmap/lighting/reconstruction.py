@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, give_back, tiles
+from ...numerics import Array, tiles
 from ...scene import Scene
 from ...solver.gather import Footprints, LightGains, LocalPass
 from ..points import alike_neighbors
@@ -92,7 +92,7 @@ def light_texels(
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
     del emission
     gains = _direct_light(local, geometry, previous, lamps, so_far, progress.part(0.0, DIRECT))
-    _give_back(geometry)
+    geometry.scratch.give_back()
     more = None if previous is None else lamps - local.direct.lit_by(previous.lit.gains)
     if more is not None:
         local = _brightened(local, element, more)
@@ -105,7 +105,7 @@ def light_texels(
         progress=progress.part(DIRECT, CROSSED),
     )
     table = HitTable(local, geometry, crossings, uneven_texels(geometry, lamps))
-    _give_back(geometry)
+    geometry.scratch.give_back()
     standing = None if previous is None else StandingHits(previous, table)
     turns = iter([progress.part(CROSSED, 1.0)])
     if more_rays is not None:
@@ -118,7 +118,7 @@ def light_texels(
     else:
         start, transport = standing.start(transport, rows, element, more)
     alike = alike_neighbors(geometry, local.caster, crossings.alone, local.threads)
-    _give_back(geometry)
+    geometry.scratch.give_back()
     while True:
         light = sweep(
             transport,
@@ -156,15 +156,6 @@ def light_texels(
     )
     bright = local.gather.bright if standing is None else standing.bright
     return replace(light, kept=lit, traced=LightingRecord(settings, table, layout, rows, bright, error))
-
-
-def _give_back(geometry: TexelGeometry) -> None:
-    """Give back what a step freed, unless arrays of the next one would take it: its temporaries need it.
-
-    They would not where memory is ample, nor where there is none left for arrays.
-    """
-    if not geometry.scratch.in_files or geometry.scratch.room() <= 0:
-        give_back()
 
 
 def _direct_light(
@@ -211,7 +202,7 @@ def _trace(
         table.local, table.crossings, settings, table.number, values, kept, met, gathering
     )
     del kept
-    _give_back(table.geometry)
+    table.geometry.scratch.give_back()
     if standing is not None:
         known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)

@@ -207,6 +207,7 @@ def gather_texels(
             if len(start):
                 variance = np.append(variance, np.add.reduceat(of_runs, start) / count)
         points.add(stride, *runs.points(lists))
+        geometry.scratch.give_back()
     del found, variance
     if kept is None:
         spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))

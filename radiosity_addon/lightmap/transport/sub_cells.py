@@ -159,6 +159,7 @@ def gather_sub_cells(
         if not gathering.gather_new(turn):
             break
         gathering.take_known()
+        table.geometry.scratch.give_back()
     small = gathering.small()
     rows = TableRows(table.first_small, small)
     made = gathering.links(rows, reflectance, progress.part(0.5, 1.0))
@@ -225,15 +226,14 @@ class _SubCellGather:
 
     def gather_new(self, progress: Progress) -> bool:
         """Gather from the cells that were met and have not gathered yet; return whether there were any."""
-        numbers, rays_of_tile = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.uint16)]
+        found = [(np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.uint16))]
         for tile in tiles(len(self._state)):
             state = self._state[tile]
             new = np.flatnonzero((state > 0) & (state < GATHERED))
-            numbers.append((self._first + tile.start + new).astype(np.int32))
-            rays_of_tile.append(self._rays(state[new]))
+            found.append(((self._first + tile.start + new).astype(np.int32), self._rays(state[new])))
             state[new] |= GATHERED
-        number, rays_of = np.concatenate(numbers), np.concatenate(rays_of_tile)
-        del numbers, rays_of_tile
+        number, rays_of = (np.concatenate(part) for part in zip(*found, strict=True))
+        del found
         is_elements = number < self._table.first_cell
         groups = [
             (of_element, rays)
@@ -243,10 +243,10 @@ class _SubCellGather:
         for (of_element, rays), part in progress.each(groups):
             cells = number[(is_elements == of_element) & (rays_of == rays)]
             for tile, of_tile in part.each(list(tiles(len(cells)))):
-                found = self._found.get((of_element, rays))
-                if found is None:
-                    found = self._found[of_element, rays] = _FoundCells(self._table, of_element, rays)
-                self.count(found.gather(cells[tile], of_tile))
+                kind = self._found.get((of_element, rays))
+                if kind is None:
+                    kind = self._found[of_element, rays] = _FoundCells(self._table, of_element, rays)
+                self.count(kind.gather(cells[tile], of_tile))
         return len(number) > 0
 
     def small(self) -> Array:
