@@ -87,6 +87,13 @@ def test_no_file_is_replaced_and_the_scene_never(run: Run, turned: Path, tmp_pat
     assert not (tmp_path / "a.blend").exists()
 
 
+def test_a_folder_that_is_a_file_is_named_once(run: Run, turned: Path, tmp_path: Path) -> None:
+    output = turned / "out.blend"
+    done = run("flip", str(turned), "--output", str(output))
+    assert done.code == 1
+    assert done.err.strip() == f"error: cannot write '{output}': Not a directory"
+
+
 def test_without_light_it_says_so(run: Run, tmp_path: Path) -> None:
     add_quad("Floor", ((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)))
     scene = save(tmp_path / "dark.blend")

@@ -311,7 +311,9 @@ def refuse_special(path: Path) -> None:
         found = path.lstat()
     except FileNotFoundError:
         return
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
+    except ValueError as error:
         raise BakeError(f"cannot write '{path}': {error}") from error
     kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISLNK, "a link"))
     kind = next((text for test, text in kinds if test(found.st_mode)), "not a regular file")
