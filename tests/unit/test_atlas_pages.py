@@ -67,7 +67,12 @@ def test_objects_are_on_the_pages_they_name(density):
 
 def test_pages_without_objects_are_left_out():
     objects = [AtlasInput(f"box {page}", *box((1, 1, 1)), page=page) for page in (4, 2)]
-    assert [laid.page for laid in run_atlas(objects, 64, pages=4).objects] == [1, 0]
+    atlas = run_atlas(objects, 64, pages=4)
+    assert [laid.page for laid in atlas.objects] == [1, 0]
+    (note,) = atlas.warnings
+    assert (note.name, note.is_note) == ("scene", True)
+    assert note.message == "only 2 of 4 pages are used: all of an object lies on one page"
+    assert not run_atlas(objects, 64, pages=2).warnings
 
 
 def test_what_does_not_fit_on_the_page_it_names_is_an_error():

@@ -106,6 +106,9 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
         for each, uv in zip(group, np.split(packing.uv, ends[:-1]), strict=True):
             placed[each] = AtlasObject(uv, number)
     pages = tuple(_page(packing) for _, packing in laid)
+    if options.shared and options.texel_density is None and len(pages) < options.pages:
+        used = f"only {len(pages)} of {options.pages} pages {'is' if len(pages) == 1 else 'are'} used"
+        warnings.append(BakeWarning("scene", f"{used}: all of an object lies on one page", is_note=True))
     all_placed = tuple(each for each in placed if each is not None)
     stretched = _stretched(layouts, all_placed, pages)
     return Atlas(all_placed, pages, (*warnings, *stretched_warnings(stretched)), tuple(stretched))
