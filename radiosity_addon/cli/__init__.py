@@ -17,6 +17,7 @@ from .parser import (
     check_plot,
     check_scene,
     check_sharing,
+    given_options,
     requested_settings,
 )
 from .path_checks import check_folder, escaped, printable, quoted
@@ -41,6 +42,7 @@ __all__ = [
     "check_sharing",
     "escaped",
     "fail",
+    "given_options",
     "printable",
     "quoted",
     "read_farm_spec",

@@ -52,6 +52,11 @@ def requested_settings(request: argparse.Namespace) -> BakeSettings:
     return BakeSettings(**given)
 
 
+def given_options(request: argparse.Namespace) -> list[str]:
+    """Return the names of the settings that a parsed command gives, be it with their defaults."""
+    return [name for name in OPTIONS if name in vars(request)]
+
+
 def light_group(text: str) -> GroupSetting:
     """Read a light group as the command line has it: NAME=MEMBER,MEMBER…
 

@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.options.bake_settings import BakeSettings
+
 from .conftest import (
     QUICK,
     Baked,
@@ -65,6 +67,10 @@ def test_without_a_preview(run: Run, room: Path, tmp_path: Path) -> None:
     done = run("bake", room, "--output", tmp_path / "out", "--relight", *QUICK, "--opaque-glass")
     assert done.code == 2
     assert "which differ in --opaque-glass: leave these out, or bake again" in done.err
+    default = str(BakeSettings().resolution)
+    done = run("bake", room, "--output", tmp_path / "out", "--relight", "--resolution", default)
+    assert done.code == 2
+    assert "which differ in --resolution: leave these out, or bake again" in done.err
     assert digest(tmp_path / "out") == before
 
 

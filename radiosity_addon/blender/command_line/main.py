@@ -28,6 +28,7 @@ from ...cli import (
     check_scene,
     check_sharing,
     fail,
+    given_options,
     requested_settings,
     with_notes,
 )
@@ -171,7 +172,8 @@ def _bake(
     if request.relight:
         from .relight_verb import relight
 
-        relight(scene, loaded, output, settings, request.report, *of_all, preview=preview, form=form)
+        given = given_options(request)
+        relight(scene, loaded, output, settings, given, request.report, *of_all, preview=preview, form=form)
     else:
         verbs.bake(
             scene,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -45,6 +45,7 @@ def relight(
     loaded: Path | None,
     output: Path,
     settings: BakeSettings,
+    given: Sequence[str],
     report_copy: Path | None,
     allowed: Permissions,
     console: Console,
@@ -62,7 +63,9 @@ def relight(
     output : Path
         The folder with the bake and its sidecar.
     settings : BakeSettings
-        As they were given; the bake has its own, and others than those are refused.
+        The bake has its own: …
+    given : sequence of str
+        … those of these names that are others are refused.
 
     Raises
     ------
@@ -79,7 +82,7 @@ def relight(
         console.progress("read", 0.0)
         stored = read_sidecar(output / SIDECAR_NAME, settings.memory_limit)
         check_belongs(stored, output / REPORT_NAME)
-        other = _other_flags(settings, stored.settings)
+        other = _other_flags(settings, given, stored.settings)
         if other:
             raise UsageError(
                 f"--relight uses the settings of the bake in {output}, which differ in {', '.join(other)}: "
@@ -118,12 +121,12 @@ def _check_same_scene(output: Path, source: Path | None) -> None:
             )
 
 
-def _other_flags(given: BakeSettings, of_bake: BakeSettings) -> list[str]:
+def _other_flags(settings: BakeSettings, given: Sequence[str], of_bake: BakeSettings) -> list[str]:
     """Return the flags that were given with other values than those of a bake; memory is this run's own."""
     return [
-        option.flag
-        for name, option in OPTIONS.items()
-        if name != "memory_limit" and getattr(given, name) not in (option.default, getattr(of_bake, name))
+        OPTIONS[name].flag
+        for name in given
+        if name != "memory_limit" and getattr(settings, name) != getattr(of_bake, name)
     ]
 
 
