@@ -44,6 +44,18 @@ def test_arrays_go_to_files_when_the_budget_is_used_up() -> None:
     assert not is_in_file(scratch.empty(COUNT, np.int32))
 
 
+@pytest.mark.parametrize(("in_files", "free", "given"), [(0, 1e6, 1), (1, 1e6, 0), (1, 0.0, 1)])
+def test_freed_memory_is_given_back_unless_arrays_would_take_it(
+    in_files: int, free: float, given: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[None] = []
+    monkeypatch.setattr(module, "give_back", lambda: calls.append(None))
+    scratch = Scratch()
+    scratch.in_files, scratch.free = in_files, lambda: free
+    scratch.give_back()
+    assert len(calls) == given
+
+
 def test_small_arrays_stay_in_memory() -> None:
     assert not is_in_file(Scratch(0.0).empty(COUNT - 1, np.int32))
 
