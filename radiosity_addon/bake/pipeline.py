@@ -41,15 +41,13 @@ from .relight import (
     held_values,
 )
 from .result import (
-    BakedObject,
     BakeResult,
     LightGroup,
     More,
     Picture,
     TexelPictures,
+    baked_with_figures,
     more_of,
-    object_density,
-    share_of_page,
     solver_part,
 )
 from .stages import StageTimes, timed
@@ -212,16 +210,8 @@ def finish(
     of_texels = small_objects(bake_scene, baked, geometry)
     coincident = coincident_counts(baked, bake_scene.scene)
     warnings = (*bake_scene.warnings, *of_texels, *of_coincident(coincident), *solved.warnings)
-    objects = tuple(
-        BakedObject(
-            item,
-            placed.uv,
-            placed.page,
-            object_density(geometry, item),
-            share_of_page(geometry, item, placed.page),
-        )
-        for item, placed in zip(baked, atlas.objects, strict=True)
-    )
+    pages_of = [placed.page for placed in atlas.objects]
+    objects = baked_with_figures(baked, pages_of, geometry, bake_scene.scene.areas)
     light, details = more
     shown = with_levels(bake_scene, objects)
     if light:

@@ -12,7 +12,7 @@ import pytest
 from radiosity_addon.bake import pipeline
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.bake.rebaking import bake_moved
-from radiosity_addon.bake.relight.kept_bake import KeptBake, noise_warnings, relight_pages
+from radiosity_addon.bake.relight.kept_bake import KeptBake, estimated_errors, noise_warnings, relight_pages
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -165,10 +165,10 @@ def test_light_that_rays_were_not_aimed_at_causes_a_warning() -> None:
     bulb = PointLight((1.0, 1.0, 2.45), np.zeros(3), 0.02, name="Bulb")
     scene = replace(scene, scene=scene.scene.with_lights([*scene.scene.lights, bulb]))
     kept = bake_and_keep(scene, SETTINGS)[1]
-    assert noise_warnings(kept, kept.strengths) == ()
+    assert noise_warnings(*estimated_errors(kept, kept.strengths)) == ()
     wanted = np.array([(0.0, 0.0, 0.0), (POWER, POWER, POWER)])
     relight_pages(kept, wanted)
-    (warning,) = noise_warnings(kept, wanted)
+    (warning,) = noise_warnings(*estimated_errors(kept, wanted))
     assert "bake again" in warning.message
 
 

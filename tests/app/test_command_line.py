@@ -59,10 +59,19 @@ def test_without_a_preview(run: Run, room: Path, tmp_path: Path) -> None:
     assert set(digest(tmp_path / "out")) == files
     assert "preview.png" not in done.out
     assert all(f"  {name} " in done.out for name in files)
-    assert "preview" not in read_report(tmp_path / "out")["seconds"]
+    baked = read_report(tmp_path / "out")
+    assert "preview" not in baked["seconds"]
     done = run("bake", room, "--output", tmp_path / "out", "--relight", "--no-preview")
     assert (done.code, done.err) == (0, "")
     assert set(digest(tmp_path / "out")) == files
+    relit = read_report(tmp_path / "out")
+    # No light has changed, but of other light than the bake's these would not be known.
+    for entry in baked["objects"]:
+        del entry["irradiance_W_m2"], entry["illuminance_lx"]
+    assert baked["solver"].pop("power_W")
+    assert relit["solver"].pop("history") == []
+    del baked["solver"]["history"]
+    assert all(relit[name] == baked[name] for name in ("objects", "pages", "solver", "warnings"))
     before = digest(tmp_path / "out")
     done = run("bake", room, "--output", tmp_path / "out", "--relight", *QUICK, "--opaque-glass")
     assert done.code == 2

@@ -158,15 +158,24 @@ def relight_pages(kept: KeptBake, strengths: Array, progress: Progress = SILENT)
         raise damaged(kept.origin) from error
 
 
-def noise_warnings(kept: KeptBake, strengths: Array) -> tuple[BakeWarning, ...]:
+def estimated_errors(kept: KeptBake, strengths: Array) -> tuple[float, float]:
+    """Estimate the relative RMS error of lightmaps as they were baked, and relit with strengths (s, 3).
+
+    Of a bake that was read from a file both are rough, but in the right proportion: which rays are of one
+    gather point is not stored.
+    """
+    before, now = (
+        estimated_error(kept.lit, kept.solved, lights, kept.geometry.scratch)
+        for lights in (kept.strengths, kept.sources.checked(strengths))
+    )
+    return before, now
+
+
+def noise_warnings(before: float, now: float) -> tuple[BakeWarning, ...]:
     """Warn if lightmaps that were relit are noisier than the bake: its rays were for other light.
 
-    strengths (s, 3): They were relit with.
+    before, now: Their `estimated_errors`.
     """
-    scratch, wanted = kept.geometry.scratch, kept.sources.checked(strengths)
-    before, now = (
-        estimated_error(kept.lit, kept.solved, lights, scratch) for lights in (kept.strengths, wanted)
-    )
     if now <= max(NOISIER * before, before + MORE_NOISE):
         return ()
     return (

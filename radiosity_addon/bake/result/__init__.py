@@ -5,7 +5,7 @@ Plain records and files, nothing that bakes.
 
 from __future__ import annotations
 
-from .details import MEANS, More, more_of, object_density, share_of_page, statistics
+from .details import MEANS, More, baked_with_figures, more_of, statistics
 from .history_plot import write_history
 from .pictures import Picture, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
@@ -26,9 +26,8 @@ __all__ = [
     "TexelPicture",
     "TexelPictures",
     "TexelSurfaces",
+    "baked_with_figures",
     "more_of",
-    "object_density",
-    "share_of_page",
     "solver_part",
     "statistics",
     "write_history",

@@ -9,14 +9,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ...lightmap.images import light_statistics, lit_texels
-from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry
+from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry, texel_areas
 from ...lightmap.transport import TexelLight
-from ...numerics import Array, luminous, tiles, triangle_areas
+from ...numerics import Array, luminous, tiles
 from ...options import EFFICACY
 from ...scene import BakeObject
 from ...solver import Solution
 from ...solver.state import LinkRecord
-from .result import BakeDetails, PageDetails
+from .result import BakeDetails, BakedObject, PageDetails
 
 MEANS = np.full(3, 1.0 / 3.0)
 """Weights of the channels in what the report gives in W/m²."""
@@ -129,21 +129,36 @@ def statistics(
     return tuple(found)
 
 
-def object_density(geometry: TexelGeometry, item: BakeObject) -> float | None:
-    """Return the texels per meter of an object, the median over its surface; None without texels."""
-    areas = triangle_areas(geometry.triangles[item.rows])
-    density = 1.0 / np.sqrt(np.maximum(geometry.texel_area[item.rows], 1e-300))
+def baked_with_figures(
+    baked: Sequence[BakeObject], pages: Sequence[int], geometry: TexelGeometry, areas: Array
+) -> tuple[BakedObject, ...]:
+    """Return objects with their lightmap UVs, page, texels per meter, and share of the page's texels.
+
+    pages: Parallel to `baked`.
+    areas (t,): Of the scene's triangles [m²].
+    """
+    found = []
+    for item, page in zip(baked, pages, strict=True):
+        uv, own = geometry.uv[item.rows], areas[item.rows]
+        there = geometry.page_of_triangle[item.rows] == page
+        size = np.where(there, texel_areas(uv, own, len(geometry.index[page])), np.inf)
+        texels = geometry.counts[item.rows].sum()
+        share = float(texels / max(geometry.page_start[page + 1] - geometry.page_start[page], 1))
+        found.append(BakedObject(item, uv, page, _density(size, own), share))
+    return tuple(found)
+
+
+def _density(texel_area: Array, areas: Array) -> float | None:
+    """Return the texels per meter of an object, the median over its surface; None if it has none.
+
+    texel_area (t,): Of each of its triangles; endless where it has no texels.
+    """
+    density = 1.0 / np.sqrt(np.maximum(texel_area, 1e-300))
     order = np.argsort(density, kind="stable")
     surface = np.cumsum(areas[order])
     if surface[-1] <= 0.0:
         return None
     return float(density[order[np.searchsorted(surface, 0.5 * surface[-1])]])
-
-
-def share_of_page(geometry: TexelGeometry, item: BakeObject, page: int) -> float:
-    """Return what part of a page's texels belongs to an object."""
-    count = geometry.page_start[page + 1] - geometry.page_start[page]
-    return float(geometry.counts[item.rows].sum() / max(count, 1))
 
 
 def lit_values(

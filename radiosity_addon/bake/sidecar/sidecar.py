@@ -37,9 +37,10 @@ from ...solver.hierarchy import Clusters, Hierarchy
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
+from ..bake_warnings import coincident_counts, of_coincident, small_objects
 from ..levels import with_levels
 from ..relight import DAMAGED, KeptBake, damaged
-from ..result import BakedObject, BakeResult
+from ..result import BakeResult, baked_with_figures
 from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
@@ -109,16 +110,32 @@ class StoredBake:
             origin=str(self.path),
         )
 
-    def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...]) -> BakeResult:
-        """Return other pages as the result of a bake, laid out as it was."""
-        geometry, report = self._stored["geometry"], self._stored["report"]
+    def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...], noise: float) -> BakeResult:
+        """Return other pages as the result of a bake, laid out as it was.
+
+        The report has no powers, which are of the light that was baked.
+
+        Parameters
+        ----------
+        noise : float
+            How many times as noisy they are as those of the bake.
+        """
+        geometry, report, scene = self._stored["geometry"], self._stored["report"], bake_scene.scene
         baked = [item for item in bake_scene.objects if item.bake and item.count]
-        objects = tuple(
-            BakedObject(item, geometry.uv[item.rows], page)
-            for item, page in zip(baked, self._stored["pages"], strict=True)
+        objects = baked_with_figures(baked, self._stored["pages"], geometry, scene.areas)
+        coincident = coincident_counts(baked, scene)
+        of_faces = (*small_objects(bake_scene, baked, geometry), *of_coincident(coincident))
+        solver = {key: value for key, value in report["solver"].items() if key != "power_W"}
+        if solver.get("estimated_error") is not None:
+            solver["estimated_error"] *= noise
+        return BakeResult(
+            pages,
+            with_levels(bake_scene, objects),
+            solver,
+            (*bake_scene.warnings, *of_faces),
+            atlas=report["atlas"],
+            coincident=coincident,
         )
-        objects = with_levels(bake_scene, objects)
-        return BakeResult(pages, objects, report["solver"], bake_scene.warnings, {}, report["atlas"])
 
 
 def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) -> int:

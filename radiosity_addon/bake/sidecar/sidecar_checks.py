@@ -128,6 +128,8 @@ def _check_report(report: Any, pages: int) -> None:
     instance(solver["method"], str)
     for name in ("elements", "links", "rays"):
         whole(solver[name], 0, 1 << 62)
+    if solver.get("estimated_error") is not None:
+        number(solver["estimated_error"], 0.0)
     if not all(isinstance(page, dict) for page in instance(report["atlas"], tuple)):
         raise ValueError("atlas")
     if len(report["atlas"]) not in (0, pages):

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...bake import BakeDigests, KeepOptions, timed
-from ...bake.relight import noise_warnings, strengths_in
+from ...bake.relight import estimated_errors, noise_warnings, strengths_in
 from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeError, BakeWarning, Status, UsageError, staged
@@ -156,9 +156,10 @@ def relight_into(
             yield Status("relight", RELIGHT)
             strengths = strengths_in(kept, export.bake_scene)
             pages, groups = lit(kept, strengths)
-            noisy = noise_warnings(kept, strengths)
-        result = stored.result(export.bake_scene, pages)
-        result = replace(result, groups=groups, warnings=(*notes, *result.warnings, *noisy))
+            before, now = estimated_errors(kept, strengths)
+        result = stored.result(export.bake_scene, pages, now / before if before > 0.0 else 1.0)
+        warnings = (*notes, *result.warnings, *noise_warnings(before, now))
+        result = replace(result, groups=groups, warnings=warnings)
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Status("apply", APPLY)

@@ -13,6 +13,7 @@ import numpy as np
 from ...bake.relight import (
     KeptBake,
     are_wanted,
+    estimated_errors,
     group_pages,
     noise_warnings,
     relight_pages,
@@ -144,7 +145,7 @@ def _lit_in_thread(
 
     def work(progress: Progress) -> tuple[Relit, tuple[BakeWarning, ...]]:
         relit = lit(kept, strengths, progress.stage("relight", READ, LIT))
-        return relit, noise_warnings(kept, strengths)
+        return relit, noise_warnings(*estimated_errors(kept, strengths))
 
     steps = in_thread(work, in_background)
     try:

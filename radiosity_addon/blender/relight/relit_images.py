@@ -24,8 +24,8 @@ from .kept_bakes import group_images_of, images_of
 OF_LIGHT = ("irradiance_W_m2", "illuminance_lx")
 """What the report says of the light on objects: of other light than this, it must not stay."""
 
-POWER = "power_W"
-"""What it says of the power of all light: it goes as well."""
+OF_ALL_LIGHT = ("power_W", "estimated_error")
+"""What it says of all light: that goes as well."""
 
 Images = Mapping[int, bpy.types.Image]
 
@@ -135,7 +135,8 @@ def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: fl
         for entry in report["objects"]:
             for name in OF_LIGHT:
                 entry.pop(name, None)
-        report["solver"].pop(POWER, None)
+        for name in OF_ALL_LIGHT:
+            report["solver"].pop(name, None)
     except (KeyError, TypeError, AttributeError):
         raise BakeError(f"'{output.path / output.names.report}' is damaged: bake again") from None
     report["relit"] = {"seconds": round(seconds, 4)}

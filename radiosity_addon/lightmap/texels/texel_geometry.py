@@ -171,7 +171,7 @@ class TexelGeometry:
     @cached_property
     def counts(self) -> Array:
         """(t,) int64: how many texels each triangle has."""
-        found = np.zeros(len(self.triangles), dtype=np.int64)
+        found = np.zeros(len(self.page_of_triangle), dtype=np.int64)
         for tile in tiles(len(self)):
             triangles, count = np.unique(self.triangle[tile], return_counts=True)
             found[triangles] += count
