@@ -119,6 +119,34 @@ def places(count: int, group: int = 0) -> ChartPlaces:
     return ChartPlaces(np.full(count, group), spread, np.tile((0.0, 0.0, 1.0), (count, 1)))
 
 
+@pytest.mark.parametrize("gap", [0, 2])
+def test_each_chart_is_put_at_the_lowest_then_leftmost_free_place(gap: int) -> None:
+    """As if every place of a page were tried: most are found in the first few rows, some far above."""
+    rng = np.random.default_rng(gap)
+    boxes, chart = rectangles(rng.uniform(1, 20, (60, 2)))
+    corners = rng.uniform(0, 20, (20, 1, 3, 2))
+    bent = (corners - corners.min(axis=2, keepdims=True)).reshape(-1, 3, 2)
+    uv, chart = np.concatenate((boxes, bent)), np.append(chart, 60 + np.arange(20))
+    extent = np.stack([uv[chart == each].max(axis=(0, 1)) for each in range(80)])
+    masks, order, size = chart_masks(uv, chart, extent), rng.permutation(80), (48, 480)
+    placement, part = place((masks, masks), order, *size, gap)
+    assert part == 1.0
+    assert placement is not None
+    taken = np.zeros((size[1], size[0]), dtype=bool)
+    for each in order.tolist():
+        whole = masks.covered[masks.start[each] : masks.start[each + 1]].reshape(-1, masks.width[each])
+        turned = [np.rot90(whole, -turn) for turn in range(4)]
+        windows = [np.lib.stride_tricks.sliding_window_view(taken, of.shape) for of in turned]
+        free = [~(window & of).any(axis=(2, 3)) for window, of in zip(windows, turned, strict=True)]
+        lowest = [int(of.any(axis=1).argmax()) for of in free]
+        best = min(range(4), key=lambda turn: lowest[turn] + len(turned[turn]))
+        y, x = lowest[best], int(free[best][lowest[best]].argmax())
+        assert (placement.quarter[each], placement.x[each], placement.y[each]) == (best, x, y)
+        for row, column in np.argwhere(turned[best]) + np.array((y, x)):
+            taken[max(row - gap, 0) : row + gap + 1, max(column - gap, 0) : column + gap + 1] = True
+    assert placement.height == 1 + np.flatnonzero(taken.any(axis=1)).max() - gap
+
+
 def test_small_charts_of_one_neighborhood_share_a_texel_and_thin_ones_get_a_row() -> None:
     extent = np.array([(0.5, 0.5), (0.2, 0.9), (7.2, 0.3), (0.4, 3.0), (5.0, 5.0)])
     block = collapse(places(5), extent, 1.0, 16)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ class ChartMasks:
     _made: dict[tuple[int, int], Mask] = field(default_factory=dict)
     _alike: dict[tuple[int, tuple[int, ...]], Mask] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def boxy(self) -> Bool:
         """(count,) bool: whether a chart fills its bounding box; half a turn then changes nothing."""
         return np.asarray(np.add.reduceat(self.covered, self.start[:-1]) == self.width * self.height)
@@ -98,13 +99,20 @@ class ChartMasks:
         return found
 
     def _turned(self, chart: int, quarter: int) -> Mask:
+        if self.boxy[chart]:
+            sides = int(self.width[chart]), int(self.height[chart])
+            width, height = sides if quarter % 2 == 0 else reversed(sides)
+            return self._alike_to(width, ((1 << width) - 1,) * height)
         cells = self.covered[self.start[chart] : self.start[chart + 1]]
         grid = np.rot90(cells.reshape(-1, self.width[chart]), -quarter)
         packed = np.packbits(grid, axis=1, bitorder="little")
-        key = grid.shape[1], tuple(int.from_bytes(row.tobytes(), "little") for row in packed)
-        if key not in self._alike:
-            self._alike[key] = mask_of(*key)
-        return self._alike[key]
+        return self._alike_to(grid.shape[1], tuple(int.from_bytes(row.tobytes(), "little") for row in packed))
+
+    def _alike_to(self, width: int, rows: tuple[int, ...]) -> Mask:
+        """Return the mask of some rows, the same each time."""
+        if (width, rows) not in self._alike:
+            self._alike[width, rows] = mask_of(width, rows)
+        return self._alike[width, rows]
 
 
 def chart_masks(uv: Float, chart: Int, extent: Float) -> ChartMasks:

@@ -17,6 +17,10 @@ from .chart_masks import ChartMasks, Mask
 
 Int = NDArray[np.int64]
 
+FIRST_ROWS, MORE_ROWS = 8, 4
+"""A place is looked for in so many rows at first, and in so many times as many each time there is none:
+mostly the first row from the last place of the same shape on has one."""
+
 
 @dataclass(frozen=True)
 class Placement:
@@ -80,18 +84,28 @@ class _Page:
         first, last = self._lowest.get(mask, 0), below - height
         if width > self._width or last < first:
             return None
-        places = (1 << (self._width - width + 1)) - 1
+        places, start, rows = (1 << (self._width - width + 1)) - 1, first, FIRST_ROWS
+        while start <= last:
+            end = min(start + rows - 1, last)
+            found = self._lowest_within(mask, start, end, places)
+            if found is not None:
+                self._lowest[mask] = found[1]
+                return found
+            start, rows = end + 1, MORE_ROWS * rows
+        self._lowest[mask] = max(first, last + 1)
+        return None
+
+    def _lowest_within(self, mask: Mask, first: int, last: int, places: int) -> tuple[int, int] | None:
+        """Return (x, y) of the lowest, then leftmost place of a chart that begins in some rows."""
         fits = self._candidates(mask, first, last)
-        tall = self._windows(height, first, last) if len(mask.bands) == 1 and len(fits) > 1 else None
+        tall = self._windows(mask.height, first, last) if len(mask.bands) == 1 and len(fits) > 1 else None
         for y in (first + fits).tolist():
             if tall is None:
                 free = self._free(mask, y, places)
             else:
                 free = ~_met(tall[y - first], mask.bands[0][2]) & places
             if free:
-                self._lowest[mask] = y
                 return (free & -free).bit_length() - 1, y
-        self._lowest[mask] = max(first, last + 1)
         return None
 
     def _candidates(self, mask: Mask, first: int, last: int) -> Int:
@@ -125,17 +139,25 @@ class _Page:
 
     def put(self, mask: Mask, x: int, y: int) -> None:
         """Take a chart's cells and those within the gap around them."""
-        gap, height = self._gap, mask.height
+        gap, height, before, taken = self._gap, mask.height, 0, 0
         for row in range(max(y - gap, 0), min(y + height + gap, len(self._rows))):
             near = 0
             for own in mask.rows[max(row - y - gap, 0) : row - y + gap + 1]:
                 near |= own
-            near <<= x + gap
-            wide = near
-            for step in range(1, gap + 1):
-                wide |= near << step | near >> step
-            self._rows[row] |= (wide >> gap) & self._full
-            self._longest[row] = _longest_run(~self._rows[row] & self._full)
+            if near != before:
+                before, taken = near, self._widened(near, x)
+            self._rows[row] |= taken
+            free = ~self._rows[row] & self._full
+            if not _has_run(free, int(self._longest[row])):
+                self._longest[row] = _longest_run(free)
+
+    def _widened(self, cells: int, x: int) -> int:
+        """Return the cells of a row, moved to a column, and those within the gap beside them."""
+        moved = cells << x + self._gap
+        wide = moved
+        for step in range(1, self._gap + 1):
+            wide |= moved << step | moved >> step
+        return (wide >> self._gap) & self._full
 
 
 def _met(taken: int, runs: tuple[tuple[int, int], ...]) -> int:
@@ -148,6 +170,15 @@ def _met(taken: int, runs: tuple[tuple[int, int], ...]) -> int:
             span *= 2
         met |= spread | spread >> (length - span)
     return met
+
+
+def _has_run(row: int, length: int) -> bool:
+    """Return whether a row has a run of set bits so long: sooner told than how long the longest is."""
+    span = 1
+    while 2 * span <= length:
+        row &= row >> span
+        span *= 2
+    return length == 0 or row & row >> (length - span) != 0
 
 
 def _longest_run(row: int) -> int:
