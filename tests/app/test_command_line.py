@@ -71,6 +71,8 @@ def test_without_a_preview(run: Run, room: Path, tmp_path: Path) -> None:
     assert baked["solver"].pop("power_W")
     assert relit["solver"].pop("history") == []
     del baked["solver"]["history"]
+    errors = [report["solver"].pop("estimated_error") for report in (baked, relit)]
+    assert errors[1] == pytest.approx(errors[0], rel=0.01)
     assert all(relit[name] == baked[name] for name in ("objects", "pages", "solver", "warnings"))
     before = digest(tmp_path / "out")
     done = run("bake", room, "--output", tmp_path / "out", "--relight", *QUICK, "--opaque-glass")

@@ -163,7 +163,6 @@ def test_each_format_of_sidecars_is_relit_or_refused_by_name_and_restored(
     try:
         bpy.ops.wm.open_mainfile(filepath=str(place / "kitchen.blend"))
         assert all(shows_lightmap(bpy.data.objects[name]) for name in BAKED)
-        bpy.context.scene.cycles.blur_glossy = 0.0  # when it was baked, all gloss was bounced
         before, light = tree(place), [mean_of(image) for image in lightmaps()]
         bpy.data.lights["Lamp"].energy *= 3
         if number == FORMAT:

@@ -42,7 +42,7 @@ def outcome(path: Path, told: Any, arrays: list[Array]) -> str:
             warnings.simplefilter("ignore")  # of numbers that overflow
             stored = read_sidecar(path)
             pages = relight_pages(stored.kept(scene), CHANGED)
-            stored.result(scene, pages, noise=1.0)
+            stored.result(scene, pages, error=0.1)
     except SceneError as error:
         return f"{path} is of another scene: {error}"
     except RadiosityError as error:

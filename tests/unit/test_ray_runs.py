@@ -5,21 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.points import GatherPoints, Interpolation
+from radiosity_addon.lightmap.points import GatherPoints
 from radiosity_addon.lightmap.texels import TexelGeometry, rasterize
-from radiosity_addon.lightmap.transport import GatherPointLayout
+from radiosity_addon.lightmap.transport import ray_runs
 from radiosity_addon.lightmap.transport.ray_runs import (
     EVEN,
     MOST_RUNS,
     RUNS,
+    any_of_runs,
+    mean_over_runs,
     noise_weights,
-    over_points,
-    over_rows,
+    number_of_points,
+    over_runs,
     runs_of,
     runs_with,
     variance_of,
 )
-from radiosity_addon.numerics import Scratch, run_numbers, stratified_square
+from radiosity_addon.numerics import run_numbers, stratified_square
 from radiosity_addon.rays import EmbreeCaster
 from tests.rooms import gray_scene, rectangle
 
@@ -27,36 +29,17 @@ RANDOM = np.random.default_rng(5)
 COUNTS = np.array([1, 2, 7, 3, 16, 1])
 
 
-def interpolation() -> Interpolation:
-    """Four texels that take from six points, all weights different."""
-    return Interpolation(
-        np.array([0, 1, 4, 6]),
-        np.array([2, 0, 4, 5, 1, 3, 3, 2, 1], dtype=np.int32),
-        np.array([1.0, 0.3, 0.9, -0.2, 0.6, 0.4, 0.5, 0.3, 0.2], dtype=np.float32),
-    )
-
-
-def layout(counts: np.ndarray) -> GatherPointLayout:
-    texel = np.repeat(np.arange(len(counts)), counts)
-    return GatherPointLayout(
-        texel, np.zeros(len(texel), np.int8), run_numbers(counts), np.ones(len(texel)), np.ones(9)
-    )
-
-
-def test_a_point_stands_for_the_mean_of_its_rows() -> None:
-    rows = RANDOM.random((COUNTS.sum(), 3))
-    means = np.add.reduceat(rows, np.cumsum(COUNTS) - COUNTS) / COUNTS[:, None]
-    spread = interpolation()
-    by_row = over_rows(spread, COUNTS, Scratch())(rows)
-    np.testing.assert_allclose(by_row, spread(means), rtol=1e-6)
-
-
-def test_rows_lead_back_to_points() -> None:
-    spread, first_row = interpolation(), np.cumsum(COUNTS) - COUNTS
-    back = over_points(over_rows(spread, COUNTS, Scratch()), layout(COUNTS))
-    np.testing.assert_array_equal(back.first, spread.first)
-    np.testing.assert_array_equal(back.point, first_row[spread.point])
-    np.testing.assert_allclose(back.weight, spread.weight, rtol=1e-6)
+@pytest.mark.parametrize("tile", [1, 4, 1000])
+def test_a_point_stands_for_the_mean_of_its_runs(tile: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many rows are looked at together: points are not cut."""
+    monkeypatch.setattr(ray_runs, "TILE", tile)
+    run, values = run_numbers(COUNTS).astype(np.int16), RANDOM.random((COUNTS.sum(), 3))
+    parts = np.split(values, np.cumsum(COUNTS)[:-1])
+    assert number_of_points(run) == len(COUNTS)
+    np.testing.assert_allclose(mean_over_runs(values, run), [part.mean(axis=0) for part in parts], rtol=1e-12)
+    marked = values[:, 0] > 0.8
+    assert any_of_runs(marked, run).tolist() == [bool((part[:, 0] > 0.8).any()) for part in parts]
+    np.testing.assert_array_equal(over_runs(np.arange(len(COUNTS)), run), np.repeat(np.arange(6), COUNTS))
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 16])

@@ -78,13 +78,13 @@ def test_a_stored_bake_gives_the_same_lightmaps_to_the_last_bit(
 
 def test_the_layout_of_the_bake_is_stored_with_it(room: tuple[BakeResult, KeptBake], path: Path) -> None:
     result, _ = room
-    stored = read_sidecar(path).result(lit_bake(CHANGED), result.pages, noise=2.0)
+    stored = read_sidecar(path).result(lit_bake(CHANGED), result.pages, error=0.25)
     for found, expected in zip(stored.objects, result.objects, strict=True):
         assert (found.object.name, found.page) == (expected.object.name, expected.page)
         np.testing.assert_array_equal(found.uv, expected.uv)
         assert (found.density, found.share) == (pytest.approx(expected.density), expected.share)
     assert stored.solver["elements"] == result.solver["elements"]
-    assert stored.solver["estimated_error"] == 2.0 * result.solver["estimated_error"]
+    assert stored.solver["estimated_error"] == 0.25
     assert json.dumps(stored.atlas) == json.dumps(result.atlas)
 
 

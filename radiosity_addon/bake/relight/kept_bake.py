@@ -159,11 +159,7 @@ def relight_pages(kept: KeptBake, strengths: Array, progress: Progress = SILENT)
 
 
 def estimated_errors(kept: KeptBake, strengths: Array) -> tuple[float, float]:
-    """Estimate the relative RMS error of lightmaps as they were baked, and relit with strengths (s, 3).
-
-    Of a bake that was read from a file both are rough, but in the right proportion: which rays are of one
-    gather point is not stored.
-    """
+    """Estimate the relative RMS error of lightmaps as they were baked, and relit with strengths (s, 3)."""
     before, now = (
         estimated_error(kept.lit, kept.solved, lights, kept.geometry.scratch)
         for lights in (kept.strengths, kept.sources.checked(strengths))

@@ -45,7 +45,7 @@ from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
-MAGIC, FORMAT = b"RADIOSITYRELIGHT", 6
+MAGIC, FORMAT = b"RADIOSITYRELIGHT", 7
 """The format rises with every change of the stored fields (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
@@ -110,15 +110,15 @@ class StoredBake:
             origin=str(self.path),
         )
 
-    def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...], noise: float) -> BakeResult:
+    def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...], error: float) -> BakeResult:
         """Return other pages as the result of a bake, laid out as it was.
 
         The report has no powers, which are of the light that was baked.
 
         Parameters
         ----------
-        noise : float
-            How many times as noisy they are as those of the bake.
+        error : float
+            The estimate of theirs.
         """
         geometry, report, scene = self._stored["geometry"], self._stored["report"], bake_scene.scene
         baked = [item for item in bake_scene.objects if item.bake and item.count]
@@ -126,12 +126,10 @@ class StoredBake:
         coincident = coincident_counts(baked, scene)
         of_faces = (*small_objects(bake_scene, baked, geometry), *of_coincident(coincident))
         solver = {key: value for key, value in report["solver"].items() if key != "power_W"}
-        if solver.get("estimated_error") is not None:
-            solver["estimated_error"] *= noise
         return BakeResult(
             pages,
             with_levels(bake_scene, objects),
-            solver,
+            {**solver, "estimated_error": error},
             (*bake_scene.warnings, *of_faces),
             atlas=report["atlas"],
             coincident=coincident,

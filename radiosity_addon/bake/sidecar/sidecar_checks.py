@@ -23,6 +23,7 @@ from ...lightmap.transport import (
     SubCells,
     TexelTransport,
     WarmStart,
+    number_of_points,
 )
 from ...lights import Emitter, Light, SkyPatch, SkyTable
 from ...options import MAX_RESOLUTION, BakeSettings
@@ -128,8 +129,6 @@ def _check_report(report: Any, pages: int) -> None:
     instance(solver["method"], str)
     for name in ("elements", "links", "rays"):
         whole(solver[name], 0, 1 << 62)
-    if solver.get("estimated_error") is not None:
-        number(solver["estimated_error"], 0.0)
     if not all(isinstance(page, dict) for page in instance(report["atlas"], tuple)):
         raise ValueError("atlas")
     if len(report["atlas"]) not in (0, pages):
@@ -221,7 +220,11 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
     rays = np.shape(links.sources)[1]
     require(rays > 0, "no rays")
     integers(links.sources, (gather, rays), lowest, surfaces - 1)
-    _check_interpolation(instance(links.spread, Interpolation), texels, gather)
+    points = gather
+    if links.run is not None:
+        _check_runs(links.run, gather)
+        points = number_of_points(links.run)
+    _check_interpolation(instance(links.spread, Interpolation), texels, points)
     aimed = instance(links.aimed, AimedRays)
     shape = np.shape(aimed.sources)
     integers(aimed.row, shape[:1], 0, gather - 1)
@@ -256,11 +259,17 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
         numbers(table, (surfaces, 3), 0.0)
 
 
-def _check_interpolation(spread: Interpolation, texels: int, gather: int) -> None:
+def _check_runs(run: Any, gather: int) -> None:
+    integers(run, (gather,), 0, np.iinfo(np.int16).max)
+    goes_on = np.diff(run.astype(np.int64)) == 1
+    require((goes_on | (run[1:] == 0)).all() and (run[:1] == 0).all(), "runs in no order")
+
+
+def _check_interpolation(spread: Interpolation, texels: int, points: int) -> None:
     entries = len(spread.point)
     integers(spread.first, (texels,), 0, entries - 1)
     require((np.diff(spread.first) > 0).all() and (spread.first[:1] == 0).all(), "texels without entries")
-    integers(spread.point, (entries,), 0, gather - 1)
+    integers(spread.point, (entries,), 0, points - 1)
     numbers(spread.weight, (entries,), -MOST_WEIGHT, MOST_WEIGHT)
     if texels:
         sums = np.add.reduceat(spread.weight.astype(np.float64), spread.first)

@@ -157,7 +157,7 @@ def relight_into(
             strengths = strengths_in(kept, export.bake_scene)
             pages, groups = lit(kept, strengths)
             before, now = estimated_errors(kept, strengths)
-        result = stored.result(export.bake_scene, pages, now / before if before > 0.0 else 1.0)
+        result = stored.result(export.bake_scene, pages, now)
         warnings = (*notes, *result.warnings, *noise_warnings(before, now))
         result = replace(result, groups=groups, warnings=warnings)
         output.expect(page_file_names(result, stored.settings))

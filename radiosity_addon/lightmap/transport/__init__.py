@@ -10,6 +10,7 @@ from .gather_points import STARTS, KeptPoints, gather_footprints, gather_texels,
 from .gather_settings import GatherSettings
 from .hit_table import HitTable, TableRows
 from .more_rays import with_more_rays
+from .ray_runs import number_of_points
 from .sub_cells import SubCellHits, SubCellLinks, SubCells, gather_sub_cells
 from .sweeps import (
     RelightableTexels,
@@ -44,6 +45,7 @@ __all__ = [
     "gather_footprints",
     "gather_sub_cells",
     "gather_texels",
+    "number_of_points",
     "relative_error",
     "sample_of",
     "sweep",

@@ -6,7 +6,7 @@ may no longer speak for.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,8 +23,7 @@ from .ray_runs import (
     RUNS,
     Values,
     further_runs,
-    over_points,
-    over_rows,
+    over_runs,
     points_of,
     runs_of,
     variance_of,
@@ -49,7 +48,7 @@ class KeptPoints:
     """The gather points that stay of an earlier bake.
 
     before: All of its g runs of rays, and …
-    spread: … how they speak for its texels.
+    spread: … how its points speak for its texels.
     rows (k,) int: Those that stay, the runs of a point all or none.
     gathered: What these meet now.
     unsure (n,) bool: Texels whose points are weighed again; further points are chosen among them.
@@ -75,10 +74,11 @@ class KeptPoints:
         """Return how `points`, these and further ones, speak for the texels."""
         of_texel = np.full(len(geometry), -1, dtype=np.int32)
         of_texel[points.texel] = np.arange(len(points))
-        spread = over_points(self.spread, self.before)
-        number = np.full(len(self.before.texel), -1, dtype=np.int32)
-        number[self.rows] = of_texel[self.before.texel[self.rows]]
-        return refit(points, geometry, spread, number, self.unsure)
+        stays = np.zeros(len(self.before.texel), dtype=bool)
+        stays[self.rows] = True
+        first, _ = points_of(self.before.run)
+        number = np.where(stays[first], of_texel[self.before.texel[first]], -1)
+        return refit(points, geometry, self.spread, number, self.unsure)
 
 
 class _Runs:
@@ -87,10 +87,13 @@ class _Runs:
     rays: Of a run.
     """
 
-    def __init__(self, local: LocalPass, geometry: TexelGeometry, rays: int) -> None:
-        self.rays, self._scratch = rays, geometry.scratch
+    def __init__(self, local: LocalPass, crossings: Crossings, resolve: Resolver, rays: int) -> None:
+        self.rays, self.crossings, self._local, self._resolve = rays, crossings, local, resolve
+        self._scratch = crossings.geometry.scratch
         self._sources = self._scratch.rows(rays, np.int32)
         self._tints = self._scratch.rows(3 * rays, np.float16) if local.caster.tinted else None
+        self._texel, self._run = self._scratch.rows(1, np.int32), self._scratch.rows(1, np.int16)
+        self._closeness = self._scratch.rows(1, np.float64)
         self._lists: list[tuple[Array, Array, Array]] = []
         self._aimed: list[AimedRays] = []
         self._first: list[int] = []
@@ -106,51 +109,85 @@ class _Runs:
         self._lists.append((texel, run, gathered.closeness))
         self._aimed.append(gathered.aimed)
 
-    def points(self, first_list: int) -> tuple[Array, Array]:
-        """Return the texels of the points added since a list, and how close things are to them."""
-        texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists[first_list:], strict=True))
+    def gather(
+        self, texels: Array, many: Array, progress: Progress, before: Array | None = None
+    ) -> Iterator[tuple[Array, Array, GatheredHits]]:
+        """Let texels (c,) gather by `many` (c,) runs after those `before` (c,); add and yield what they met.
+
+        Yields the texel and number of each run, and what it met.
+        """
+        # Across a rim light changes by more than noise: there every ray starts from a point of its own.
+        edge = self.crossings.crossed[texels]
+        done = 0.0
+        for batch, starts in ((~edge, STARTS), (edge, None)):
+            texel = np.repeat(texels[batch], many[batch])
+            run = run_numbers(many[batch], 0 if before is None else before[batch])
+            part, done = done, done + len(texel) / max(int(many.sum()), 1)
+            into, of_batch = self.more(len(texel)), progress.part(part, done)
+            at = self.crossings.geometry, texel, starts, self.rays, self._resolve
+            gathered = gather_at(self._local, *at, into, of_batch, run)
+            self.add(texel, run, gathered)
+            yield texel, run, gathered
+
+    def points(self) -> tuple[Array, Array]:
+        """Return the texels of the points added since the last call, and how close things are to them."""
+        texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists, strict=True))
+        self._take_up()
         start, count = points_of(run)
         if not len(start):
             return texel, closeness
         return texel[start], np.add.reduceat(closeness, start) / count
 
-    def count(self) -> int:
-        """Return how many lists have been added."""
-        return len(self._lists)
+    def _take_up(self) -> None:
+        """Put what was added where it stays."""
+        lists, self._lists = self._lists, []
+        for texel, run, closeness in lists:
+            for column, values in ((self._texel, texel), (self._run, run), (self._closeness, closeness)):
+                for rows in tiles(len(values)):
+                    column.extend(values[rows])
 
     def all(
         self, spread: Interpolation, level: Array, farthest: Array
     ) -> tuple[GatherLinks, GatherPointLayout]:
-        """Return the links of all runs, given how the points speak for the texels, and their (g,) levels.
+        """Return the links of all runs, given how the points speak for the texels, and their (p,) levels.
 
         Points are in the order in which the first of their runs were added.
         """
-        texel, run, closeness = (np.concatenate(part) for part in zip(*self._lists, strict=True))
+        self._take_up()
+        texel, run, closeness = (each.all()[:, 0] for each in (self._texel, self._run, self._closeness))
         aimed = AimedRays.joined(self._aimed, self._first, self._scratch)
         sources, tints = self._sources.all(), None if self._tints is None else self._tints.all()
-        first, _ = points_of(run)
-        point = np.empty(int(texel.max(initial=-1)) + 1, dtype=np.int64)
-        point[texel[first]] = np.arange(len(first))
-        order = np.lexsort((run, point[texel]))
-        if (np.diff(order) != 1).any():
+        if not _one_after_the_other(texel, run):
             # Runs were added to points that had some.
+            first, _ = points_of(run)
+            point = np.empty(int(texel.max()) + 1, dtype=np.int64)
+            point[texel[first]] = np.arange(len(first))
+            order = np.lexsort((run, point[texel]))
             place = np.empty(len(order), dtype=np.int64)
             place[order] = np.arange(len(order))
             aimed = replace(aimed, row=place[aimed.row])
             sources = self._in_order(sources, order)
             tints = None if tints is None else self._in_order(tints, order)
-        texel, run, closeness = texel[order], run[order], closeness[order]
-        _, count = points_of(run)
-        layout = GatherPointLayout(texel, np.repeat(level, count), run.astype(np.int16), closeness, farthest)
-        rows = over_rows(spread, count, self._scratch)
+            texel, run, closeness = texel[order], run[order], closeness[order]
+        layout = GatherPointLayout(texel, over_runs(level, run), run, closeness, farthest)
         tints = None if tints is None else tints.reshape(len(run), self.rays, 3)
-        return GatherLinks(sources, rows, aimed, tints, layout.run), layout
+        return GatherLinks(sources, spread, aimed, tints, layout.run), layout
 
     def _in_order(self, values: Array, order: Array) -> Array:
         result = self._scratch.empty(values.shape, values.dtype)
         for rows in tiles(len(order), CHUNK):
             result[rows] = values[order[rows]]
         return result
+
+
+def _one_after_the_other(texel: Array, run: Array) -> bool:
+    """Return whether all runs of each point are next to each other, in order."""
+    for rows in tiles(len(run)):
+        before, here = slice(max(rows.start - 1, 0), rows.stop - 1), slice(max(rows.start, 1), rows.stop)
+        follows = (texel[here] == texel[before]) & (run[here] == run[before] + 1)
+        if not (follows | (run[here] == 0)).all():
+            return False
+    return True
 
 
 def gather_texels(
@@ -174,10 +211,31 @@ def gather_texels(
     if kept is not None:
         points.farthest = np.where(kept.unsure, np.inf, kept.before.farthest)
         mean = kept.before.runs(settings.times_rays)
-    runs = _Runs(local, geometry, max(settings.rays // RUNS, 1))
-    variance = np.zeros(0)
-    for level, (stride, of_level) in enumerate(progress.part(0.0, 1.0 - FIT).each(settings.strides)):
-        lists, found = runs.count(), []
+    runs = _Runs(local, crossings, resolve, max(settings.rays // RUNS, 1))
+    _gather_levels(points, runs, settings, mean, values, kept, met, progress.part(0.0, 1.0 - FIT))
+    if kept is None:
+        spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
+    else:
+        spread = kept.refitted(points, geometry)
+    level_of_point, farthest = points.level, points.farthest
+    del points  # its pairs take as much as those of `spread`
+    return runs.all(spread, level_of_point, farthest)
+
+
+def _gather_levels(
+    points: GatherPoints,
+    runs: _Runs,
+    settings: GatherSettings,
+    mean: float,
+    values: Values | None,
+    kept: KeptPoints | None,
+    met: Met | None,
+    progress: Progress,
+) -> None:
+    """Choose points level by level and let them gather, with `mean` runs each on the finest lattice."""
+    crossings, variance = runs.crossings, np.zeros(0)
+    for level, (stride, of_level) in enumerate(progress.each(settings.strides)):
+        found = []
         if kept is not None:
             texel, run, stays = kept.of_level(level)
             sources, tints = runs.more(len(texel))
@@ -188,34 +246,17 @@ def gather_texels(
             found.append((run, stays.sources, stays.tints))
         chosen = _choose(points, crossings, kept, stride, settings.support, of_level.part(0.0, 0.15))
         many = runs_of(points, variance, chosen, mean * settings.times_rays[level], of_level.part(0.15, 0.2))
-        # Across a rim light changes by more than noise: there every ray starts from a point of its own.
-        edge = crossings.crossed[chosen]
-        done = 0.2
-        for batch, starts in ((~edge, STARTS), (edge, None)):
-            texel, run = np.repeat(chosen[batch], many[batch]), run_numbers(many[batch])
-            before, done = done, done + 0.8 * len(texel) / max(int(many.sum()), 1)
-            part = of_level.part(before, done)
-            into = runs.more(len(texel))
-            gathered = gather_at(local, geometry, texel, starts, runs.rays, resolve, into, part, run)
+        for texel, run, gathered in runs.gather(chosen, many, of_level.part(0.2, 1.0)):
             if met is not None:
                 met(texel, gathered, stride)
-            runs.add(texel, run, gathered)
-            found.append((run, *into))
+            found.append((run, gathered.sources, gathered.tints))
         if values is not None and level + 1 < len(settings.strides):
             of_runs = np.concatenate([variance_of(sources, tints, values) for _, sources, tints in found])
             start, count = points_of(np.concatenate([run for run, _, _ in found]))
             if len(start):
                 variance = np.append(variance, np.add.reduceat(of_runs, start) / count)
-        points.add(stride, *runs.points(lists))
-        geometry.scratch.give_back()
-    del found, variance
-    if kept is None:
-        spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
-    else:
-        spread = kept.refitted(points, geometry)
-    level_of_point, farthest = points.level, points.farthest
-    del points  # its pairs take as much as those of `spread`
-    return runs.all(spread, level_of_point, farthest)
+        points.add(stride, *runs.points())
+        crossings.geometry.scratch.give_back()
 
 
 def gather_more(
@@ -228,8 +269,7 @@ def gather_more(
     progress: Progress = SILENT,
 ) -> tuple[GatherLinks, GatherPointLayout]:
     """Let the points of links, whose sources are numbers, gather with `factor` times as many rays."""
-    geometry = crossings.geometry
-    runs = _Runs(local, geometry, links.sources.shape[1])
+    runs = _Runs(local, crossings, resolve, links.sources.shape[1])
     sources, tints = runs.more(len(links.sources))
     sources[:] = links.sources
     if tints is not None and links.tints is not None:
@@ -238,16 +278,9 @@ def gather_more(
     first, count = points_of(layout.run)
     texel = layout.texel[first]
     more = further_runs(count, texel, factor)
-    edge = crossings.crossed[texel]
-    done = 0.0
-    for batch, starts in ((~edge, STARTS), (edge, None)):
-        at, run = np.repeat(texel[batch], more[batch]), run_numbers(more[batch], count[batch])
-        before, done = done, done + len(at) / max(int(more.sum()), 1)
-        into, part = runs.more(len(at)), progress.part(before, done)
-        runs.add(at, run, gather_at(local, geometry, at, starts, runs.rays, resolve, into, part, run))
-    spread = over_points(links.spread, layout)
-    by_point = replace(spread, point=np.searchsorted(first, spread.point).astype(np.int32))
-    return runs.all(by_point, layout.level[first], layout.farthest)
+    for _ in runs.gather(texel, more, progress, count):
+        pass
+    return runs.all(links.spread, layout.level[first], layout.farthest)
 
 
 def gather_at(

@@ -12,15 +12,15 @@ depends on what points of coarser levels met, never on what the point itself mee
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, Scratch, fill_chunks, run_numbers, run_starts, tiles
-from ..points import GatherPoints, Interpolation
-from .traced_texels import GatherPointLayout
+from ...numerics import TILE, Array, Scratch, fill_chunks, tiles, trim
+from ..points import GatherPoints
+from .source_means import by_channel
 
 RUNS = 2
 """Runs of rays of a point where every texel is one, in the mean; on coarser lattices `times_rays` as many."""
@@ -115,27 +115,45 @@ def noise_weights(run: Array, count: Array) -> Array:
     return (weights * np.sqrt(half / np.maximum(count - half, 1))).astype(np.float32)
 
 
-def over_rows(spread: Interpolation, runs: Array, scratch: Scratch) -> Interpolation:
-    """Return how rows speak for texels, given how points do, and (g,) how many rows in turn each has."""
-    first_row = run_starts(runs)
-    first = scratch.empty(len(spread.first), np.int64)
-    row, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
-    total = 0
-    for texels in tiles(len(spread.first), CHUNK):
-        entries = spread.entries_of(texels)
-        count = runs[spread.point[entries]]
-        start = np.append(0, np.cumsum(count))
-        first[texels] = total + start[spread.first[texels] - entries.start]
-        total += int(start[-1])
-        row.extend(run_numbers(count, first_row[spread.point[entries]]).astype(np.int32))
-        weight.extend(np.repeat(spread.weight[entries] / count.astype(np.float32), count))
-    return Interpolation(first, row.all()[:, 0], weight.all()[:, 0])
+def mean_over_runs(values: Array, run: Array, scratch: Scratch | None = None) -> Array:
+    """Return (p, k) the means of (g, k) values over the runs of each point, numbered as for `points_of`."""
+    result = by_channel(number_of_points(run), values.shape[1], scratch)
+    for points, rows, first in _tiles_of_points(run):
+        count = np.diff(np.append(first, rows.stop - rows.start))
+        for channel in range(values.shape[1]):
+            result[points, channel] = np.add.reduceat(values[rows, channel], first) / count
+    return result
 
 
-def over_points(spread: Interpolation, layout: GatherPointLayout) -> Interpolation:
-    """Return what `over_rows` was given, with the first row of each point in its place."""
-    runs = np.bincount(layout.texel)[layout.texel]
-    is_first = layout.run[spread.point] == 0
-    point = spread.point[is_first]
-    first = np.append(0, np.cumsum(is_first))[spread.first]
-    return Interpolation(first, point, spread.weight[is_first] * runs[point].astype(np.float32))
+def over_runs(values: Array, run: Array) -> Array:
+    """Return (g,) what values (p,) of points are for each of their runs."""
+    result = np.empty(len(run), dtype=values.dtype)
+    for points, rows, first in _tiles_of_points(run):
+        result[rows] = np.repeat(values[points], np.diff(np.append(first, rows.stop - rows.start)))
+    return result
+
+
+def any_of_runs(marked: Array, run: Array) -> Array:
+    """Return (p,) bool: which points have a run that is marked, (g,) bool."""
+    result = np.empty(number_of_points(run), dtype=bool)
+    for points, rows, first in _tiles_of_points(run):
+        result[points] = np.logical_or.reduceat(marked[rows], first)
+    return result
+
+
+def number_of_points(run: Array) -> int:
+    """Return how many points rows with run numbers (g,) are of."""
+    return sum(int(np.count_nonzero(run[rows] == 0)) for rows in tiles(len(run)))
+
+
+def _tiles_of_points(run: Array) -> Iterator[tuple[slice, slice, Array]]:
+    """Yield some points at a time, the rows that are theirs, and where in these each point begins."""
+    done = start = 0
+    while start < len(run):
+        stop = min(start + TILE, len(run))
+        while stop < len(run) and run[stop] != 0:
+            stop += 1
+        first = np.flatnonzero(run[start:stop] == 0)
+        yield slice(done, done + len(first)), slice(start, stop), first
+        trim()
+        done, start = done + len(first), stop

@@ -286,7 +286,7 @@ def estimated_noise(
             weights = noise_weights(links.run[rows][several], count[rows][several])
             part[rows][several] = weights[:, None] * whole[rows][several]
     del whole
-    return links.spread(part, scratch=scratch)
+    return links.from_runs(part, scratch=scratch)
 
 
 def _reached(links: GatherLinks, cells: SubCellSweeps, direct: Array, beyond: int) -> Array:
@@ -305,7 +305,7 @@ def _reached(links: GatherLinks, cells: SubCellSweeps, direct: Array, beyond: in
             aims[chunk] = padded[links.sources[chunk]].any(axis=1)
             trim()
         links.mark_aims(aims, padded)
-        more = ~padded[: len(direct)] & links.spread.any_of(aims)
+        more = ~padded[: len(direct)] & links.any_of_runs(aims)
         padded[: len(direct)] |= more
         if not (cells.reach(padded) or more.any()):
             return padded[: len(reached)]

@@ -35,7 +35,8 @@ def kept_points(standing: StandingHits, progress: Progress) -> KeptPoints:
     gathered = _traced_again(standing, links, rows, progress)
     closer = ~stays
     closer[rows] = gathered.closeness > CLOSER * points.closeness[rows]
-    return KeptPoints(points, links.spread, rows, gathered, _unsure(standing, links.spread, closer))
+    unsure = _unsure(standing, links.spread, links.any_of_runs(closer))
+    return KeptPoints(points, links.spread, rows, gathered, unsure)
 
 
 def _traced_again(
@@ -88,16 +89,17 @@ def _gathered_again(
 
 
 def _unsure(standing: StandingHits, spread: Interpolation, closer: Array) -> Array:
-    """Return (n,) bool: texels whose points are weighed again, `closer` (g,) or hidden ones among them."""
+    """Return (n,) bool: texels whose points are weighed again: those with `closer` (n,) or hidden ones."""
     traced, moved, geometry = standing.previous.traced, standing.previous.affected, standing.table.geometry
-    unsure = moved.texels | geometry.neighborhood(standing.divided) | spread.any_of(closer)
+    unsure = moved.texels | geometry.neighborhood(standing.divided) | closer
     # A texel's points are in cells next to its own, no wider than the coarsest lattice.
     farthest = CELLS_ACROSS * max(*traced.settings.strides, 1.5) * geometry.texel_size * 2.0**geometry.scale
     near = np.flatnonzero(moved.boxes.near(geometry.position, farthest[geometry.triangle]))
     ends = np.append(spread.first, len(spread.point))
     count = ends[near + 1] - ends[near]
     texel = np.repeat(near, count)
-    point = traced.points.texel[spread.point[run_numbers(count, ends[near])]]
+    of_point = traced.points.texel[traced.points.run == 0]
+    point = of_point[spread.point[run_numbers(count, ends[near])]]
     start, normal = geometry.position[texel], geometry.normal[texel]
     along = geometry.position[point] - start
     bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, geometry.normal[point]), 0.0))
