@@ -34,6 +34,7 @@ from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import PointLight, Scene
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
+from tests.rooms import gray_scene
 from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene
 
@@ -86,6 +87,15 @@ def test_the_layout_of_the_bake_is_stored_with_it(room: tuple[BakeResult, KeptBa
     assert stored.solver["elements"] == result.solver["elements"]
     assert stored.solver["estimated_error"] == 0.25
     assert json.dumps(stored.atlas) == json.dumps(result.atlas)
+
+
+def test_relit_bakes_still_warn_of_shapes(room: tuple[BakeResult, KeptBake], path: Path) -> None:
+    """The box turned inside out: that has nothing to do with light."""
+    triangles = lit_bake().scene.triangles.copy()
+    triangles[-12:] = triangles[-12:, ::-1]
+    turned = bake_scene(gray_scene(triangles), ("Room", 10), ("Panel", 2), ("Sign", 2), ("Box", 12))
+    warnings = read_sidecar(path).result(turned, room[0].pages, error=0.25).warnings
+    assert [warning.name for warning in warnings if "is inside out on 100%" in warning.message] == ["Box"]
 
 
 def test_textures_and_darkness_are_stored_too(tmp_path: Path) -> None:

@@ -42,6 +42,7 @@ from ..levels import with_levels
 from ..relight import DAMAGED, KeptBake, damaged
 from ..result import BakeResult, baked_with_figures
 from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
+from ..turned_faces import of_inside_out
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
@@ -113,7 +114,7 @@ class StoredBake:
     def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...], error: float) -> BakeResult:
         """Return other pages as the result of a bake, laid out as it was.
 
-        The report has no powers, which are of the light that was baked.
+        What is of the light that was baked is left out: powers, and warnings of faces lit from behind.
 
         Parameters
         ----------
@@ -124,13 +125,14 @@ class StoredBake:
         baked = [item for item in bake_scene.objects if item.bake and item.count]
         objects = baked_with_figures(baked, self._stored["pages"], geometry, scene.areas)
         coincident = coincident_counts(baked, scene)
-        of_faces = (*small_objects(bake_scene, baked, geometry), *of_coincident(coincident))
+        of_texels = small_objects(bake_scene, baked, geometry)
+        of_faces = (*of_coincident(coincident), *of_inside_out(bake_scene))
         solver = {key: value for key, value in report["solver"].items() if key != "power_W"}
         return BakeResult(
             pages,
             with_levels(bake_scene, objects),
             {**solver, "estimated_error": error},
-            (*bake_scene.warnings, *of_faces),
+            (*bake_scene.warnings, *of_texels, *of_faces),
             atlas=report["atlas"],
             coincident=coincident,
         )
