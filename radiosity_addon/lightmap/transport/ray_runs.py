@@ -99,7 +99,7 @@ def points_of(run: Array) -> tuple[Array, Array]:
 def runs_with(run: Array) -> Array:
     """Return (g,) int16: how many runs the point of each row has, see `points_of`."""
     _, count = points_of(run)
-    return np.repeat(count.astype(np.int16), count)
+    return over_runs(count.astype(np.int16), run)
 
 
 def noise_weights(run: Array, count: Array) -> Array:
